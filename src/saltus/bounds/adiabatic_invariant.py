@@ -1,4 +1,4 @@
-"""Slow decay of small impacts under a varying load, proved: a corrected adiabatic invariant that falls along every motion.
+"""A proof that small impacts decay under a varying load: a corrected adiabatic invariant falls along every motion.
 
 On one side the gap w obeys w'' = A(t, w, u), u = w', with the pull alpha(t) = -A(t, 0, 0) > 0 and the contact damping
 c(t) = -A_u(t, 0, 0). Let E = u^2/2 + alpha w, v = sqrt(2 E), x = u / v in [-1, 1]; a flight runs from x = 1 to x = -1, and an
@@ -11,13 +11,13 @@ Let G = sum 1/alpha over the sides of a cycle, kappa = sum (c/alpha) / G, and
 
     L = 3 ln v + ln G + v h1(t, x) + v^2 h2(t, x),    alpha h1_x = 3 (q + b x^2) + G'/G + kappa,    alpha h2_x = P1,
 
-P1 being what h1 leaves in dL/dt at the order v. With h1 = (a x + b x^3)/alpha, a = 3 q + G'/G + kappa, it is
-P1 = (e1 x + e3 x^3 + e5 x^5)/alpha, odd in x, so that h2 = 0 at both ends of a flight; and h1 agrees there from side to side.
-So L goes on through an impact without loss, gains 3 ln f + v h1 (f - 1) at one with the factor f < 1, and in flight
+where P1 is the term of order v that h1 leaves in dL/dt. With h1 = (a x + b x^3)/alpha, a = 3 q + G'/G + kappa, it is P1 = (e1 x +
+e3 x^3 + e5 x^5)/alpha, odd in x, so that h2 = 0 at both ends of a flight; and the h1 of both sides agree there. L is therefore
+continuous at an impact without loss; at an impact with the factor f < 1 it changes by 3 ln f + v h1 (f - 1); and in flight
 
     dL/dt <= -kappa(t) + v^2 M(t),
 
-where M bounds what h2 leaves, with the exact S: interval bounds over cells of the time and over all x, w <= v^2 / (2 alpha).
+where M bounds the terms that h2 leaves, with the exact S: interval bounds over cells of the time and all x, w <= v^2 / (2 alpha).
 ln J = 3 ln v + ln G is the adiabatic invariant, and exp(-kappa t) its known decay (see `chatter.py`).
 """
 
@@ -63,7 +63,7 @@ class Box:
 
 @dataclass
 class Form:
-    """The normal form on one side, in cells of the time: bounds of what depends on the time alone."""
+    """The normal form on one side, in cells of the time: bounds of the quantities that depend on the time alone."""
 
     pull: Any  # alpha, from below
     weight: Interval  # 1 / alpha
@@ -79,7 +79,7 @@ class Form:
 
 
 def normal_form(side: Side, other: Side | None) -> Form:
-    """h1 and h2 on a side, and how they change; `other` is the next side of the cycle, or None if that is the same one."""
+    """h1 and h2 on a side, with their rates of change; `other` is the next side of the cycle, or None if it is the same side."""
     (q, q1, q2), (c, c1, c2) = _logarithmic(side.pull), side.damping
     b, b1, b2 = -(q + c), -(q1 + c1), -(q2 + c2)
     zero = Interval(0.0)
@@ -119,7 +119,7 @@ def _logarithmic(pull: list[Interval]) -> tuple[Interval, Interval, Interval]:
 
 
 def _coupling(side: Side, other: Side, q: tuple[Interval, ...]) -> tuple[Interval, Interval, Interval, Interval]:
-    """y = alpha h1 at x = 1, its first two derivatives, and kappa: what the other side of the cycle does to this one.
+    """The effect of the other side of the cycle on this one: y = alpha h1 at x = 1, its first two derivatives, and kappa.
 
     With the weights p = (1/alpha) / G of the sides, y = p_other z, z = 2 (q - q_other) + c_other - c.
     """
@@ -150,7 +150,7 @@ def _without_excess(q: Interval, b: Interval, f: list[Interval], f_rate: list[In
 
 
 def _growth(form: Form, box: Box, v: Any) -> Any:
-    """M(t): an upper bound of what h2 leaves in dL/dt, over v^2, for all speeds up to v and all x, in every cell."""
+    """M(t): an upper bound of the terms that h2 leaves in dL/dt, over v^2, for all speeds up to v and all x, in every cell."""
     alpha, *h = form.h
     s = 0.5 * box.w, 0.5 * (alpha * box.uu - box.w)  # alpha S, in x^2
     wu, uuu = 1.5 * (alpha * box.wu), 0.5 * (alpha.square() * box.uuu)  # alpha^2 3 x (S - S at contact) / v, its even part
@@ -190,7 +190,7 @@ def first_guess(forms: list[Form], loss: Any) -> Any:
 
 @dataclass
 class Budget:
-    """What the bounds of one side say for all speeds up to a largest one: M and abs(S), arrays (cells, n)."""
+    """The bounds of M and abs(S) on one side for all speeds up to a largest one, arrays (cells, n)."""
 
     form: Form
     growth: Any
@@ -209,11 +209,11 @@ def largest_start(budgets: list[Budget], loss: Any, period: Any, v: Any) -> Any:
     Parameters
     ----------
     budgets
-        Of the sides of a cycle.
+        The budgets of the sides of a cycle.
     loss
         -ln of the impacts' factor, at least 0; (1, n).
     period
-        What the cells of the time divide evenly; (1, n).
+        The time that the cells divide evenly; (1, n).
     v
         The largest speed for which the budgets hold; (1, n).
     """
@@ -225,9 +225,9 @@ def largest_start(budgets: list[Budget], loss: Any, period: Any, v: Any) -> Any:
 
 
 def _start(budgets: list[Budget], loss: Any, period: Any, v: Any) -> Any:
-    """The speed that keeps L low enough for speeds below v, the range of G left out; 0 where L may grow.
+    """The speed from which L stays so low that speeds remain below v, without the effect of the range of G; 0 where L may grow.
 
-    L falls over every period, and in it never rises by more than `rise`; or it falls from flight to flight, by impacts.
+    Either L falls over every period, and rises within it by no more than `rise`; or it falls from flight to flight, by impacts.
     """
     forms = [side.form for side in budgets]
     growth = reduce(np.maximum, [v * v * side.growth - side.form.decay for side in budgets])
@@ -244,7 +244,7 @@ def _start(budgets: list[Budget], loss: Any, period: Any, v: Any) -> Any:
 
 
 def _room(forms: list[Form]) -> Any:
-    """The cube root of the least G over the largest: how far the speed may rise while ln J does not; (1, n)."""
+    """The cube root of the least G over the largest: the factor by which the speed may rise although ln J does not, (1, n)."""
     low, high = (reduce(np.add, [getattr(f.weight, end) for f in forms]) for end in ("lo", "hi"))
     return np.cbrt(_least(low) / _most(high))
 

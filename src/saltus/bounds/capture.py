@@ -1,4 +1,4 @@
-"""Capture at rest, proved: from which speed after an impact a motion never leaves the contact again and comes to rest there."""
+"""Proofs of capture: a speed after an impact below which a motion never leaves the contact again and comes to rest there."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from saltus.taylor import Expr, Trace, differentiate, number, record_tables, str
 
 @dataclass(frozen=True)
 class CaptureSettings:
-    """How a proof is divided, and where it begins."""
+    """The intervals of a proof, and the speeds that are tried."""
 
     cells: int = 16  # The number of intervals into which the forcing period is divided.
-    batch: int = 8192  # Parameter sets at once where the time has no cells: their arrays then stay in the cache.
-    rest_cells: int = 64  # The same for what is at rest, where a bound is one evaluation and its width is the load's in a cell.
-    cell_batch: int = 512  # Parameter sets at once where the time has cells, for the same reason.
+    batch: int = 8192  # Parameter sets that are treated at once if the time has no cells: their arrays then stay in the cache.
+    rest_cells: int = 64  # The number of intervals for a system at rest, where a bound is cheap and the load makes all its width.
+    cell_batch: int = 512  # Parameter sets that are treated at once if the time has cells, for the same reason.
     one: float = 1e-14  # A product of impact factors this close to 1 is 1: no law states its numbers more exactly.
     # The largest speeds over which the corrected invariant is bounded, as shares of the first guess; they are tried in turn.
     boxes: tuple[float, ...] = (0.7, 0.2)
@@ -37,11 +37,10 @@ def capture_speed(system: System, parameters: Mapping[str, Any] | None = None) -
     """The speed of the gap just after an impact below which a motion is provably captured at the contact.
 
     From any impact, at any time and to any side, that leaves abs(gap_rate * velocity) below the returned speed, the motion
-    stays near the contact under all later loads and its speed falls to zero: in finite time where impacts lose speed, else as
-    damping has it. No later release is possible: the contact accelerations press on every side at all times. 0 where nothing
-    is proved, as where the load can lift the system off, where neither impacts nor damping take energy, or where the law of
-    impact has no bounded slope at rest (`EnergyRestitution`). Margins of the model that a motion is asked to stop at are not
-    looked at.
+    stays near the contact under all later loads and its speed falls to zero: in finite time if impacts lose speed, otherwise
+    through damping. No later release is possible, as the contact accelerations press on every side at all times. The speed is 0
+    where nothing is proved: for instance if the load can lift the system off, if neither impacts nor damping dissipate energy, or
+    if the impact law has no bounded slope at rest (`EnergyRestitution`). Margins at which a motion may stop are not considered.
 
     On side s the gap obeys w'' = A(t, w, u), u = w'. With f the factor of the gap's speed at impact, and the gap of one side in
     units that make the factors of both sides equal, the larger of two speeds is returned.
@@ -51,9 +50,9 @@ def capture_speed(system: System, parameters: Mapping[str, Any] | None = None) -
     where A does not depend on the time, rho <= 1, if the flights stay below the first W at which lo may be 0 (the barrier), and
     f < 1, or f <= 1 and A_u < 0.
 
-    *Corrected adiabatic invariant.* Under periodic loads these bounds do not close for f near 1, as flights gain speed while
-    the pull grows and lose it after. There L = 3 ln v + ln sum 1/alpha + O(v) falls (`adiabatic_invariant.py`), so that damping
-    captures at f = 1 too. Records of samples are not periodic: only the first bound is used with them.
+    *Corrected adiabatic invariant.* Under periodic loads the energy bounds prove nothing for f near 1, because flights gain speed
+    while the pull grows and lose it afterwards. L = 3 ln v + ln sum 1/alpha + O(v) falls nevertheless (`adiabatic_invariant.py`),
+    so that damping captures at f = 1 too. Records of samples are not periodic: only the energy bounds are used with them.
 
     All bounds are interval bounds over the whole forcing period, or the whole record, and over all openings and speeds in
     question.
@@ -73,8 +72,8 @@ def capture_speed(system: System, parameters: Mapping[str, Any] | None = None) -
     Raises
     ------
     ParameterError
-        What is no system; a path that is not a number of it; values that are none or that it refuses; shapes
-        that do not fit.
+        `system` is no system; a path leads to no number of it; a value is no number, or refused by the system; or shapes do not
+        fit together.
 
     Examples
     --------
@@ -97,7 +96,7 @@ def capture_speed(system: System, parameters: Mapping[str, Any] | None = None) -
 def proved_speeds(system: System, given: Mapping[str, np.ndarray], to: Mapping[str, np.ndarray] | None = None) -> np.ndarray:
     """`capture_speed` for flat columns of numbers that the system takes; (n,), or (1,) for numbers alone.
 
-    With other columns, `to`, each speed holds for all numbers between the two; under a load by records it is then 0.
+    With second columns, `to`, each speed holds for all numbers between the two columns; under a load by records it is then 0.
     """
     traced, law = _law_of(system)
     sides = [
@@ -119,7 +118,7 @@ def proved_speeds(system: System, given: Mapping[str, np.ndarray], to: Mapping[s
 
 
 def _law_of(system: System) -> tuple[Trace, _Law | None]:
-    """The trace of a system and what is bounded of it, None without a contact; once for each structure, whatever its numbers."""
+    """The trace of a system and the expressions that are bounded (None without a contact), kept for each structure."""
     key = structure_key(system)
     if key not in _laws:
         traced = trace(system)
@@ -170,7 +169,7 @@ def _record_ranges(system: System, traced: Trace, columns: Mapping[str, np.ndarr
     span = Interval(np.zeros_like(length), length)
     ranges = []
     for rows in np.moveaxis(tables, 1, 0):
-        drifts = np.any(rows[:, [0, -1], 1:] != 0.0)  # before and after the record, without end
+        drifts = np.any(rows[:, [0, -1], 1:] != 0.0)  # a record that drifts before its start or after its end has no bounds
         pieces = rows.reshape(-1, rows.shape[-1]).T
         value = reduce(lambda total, c: total * span + Interval(c), pieces[-2::-1], Interval(pieces[-1]))
         ranges.append(Interval(-np.inf, np.inf) if drifts else value.over_cells())
@@ -179,7 +178,7 @@ def _record_ranges(system: System, traced: Trace, columns: Mapping[str, np.ndarr
 
 @dataclass
 class _Impacts:
-    """What the impacts do in one cycle of sides: -ln of their factor, and the units of the gap that make the factors equal."""
+    """The impacts in one cycle of sides: -ln of their factor, and the units of the gap in which all factors are equal."""
 
     loss: np.ndarray  # (1, n), at least 0; NaN where nothing is known
     stretch: dict[int, np.ndarray]  # by side, (1, n)
@@ -205,7 +204,7 @@ class _Law:
         with np.errstate(all="ignore"):
             always = replace(leaves, time=self._time(leaves, 1))
             speed = self._proved(always, np.zeros((1, n)), np.full((1, n), CLIMB.widest))
-            if self.by_speed:  # the factors of the slowest impacts, then those of all that are slower than what they give
+            if self.by_speed:  # the factors of the slowest impacts first, then of all below the speed so found
                 speed = self._proved(always, speed, speed)
         return np.asarray(speed[0])
 
@@ -217,7 +216,7 @@ class _Law:
         return Interval(edges[:-1], edges[1:] * (1 + SLACK)) / leaves.parameters[self.frequency]
 
     def _proved(self, always: Leaves, reach: np.ndarray, limit: np.ndarray) -> np.ndarray:
-        """The speeds, with the factors of impacts up to the speed `reach`, where no speed passes `limit`."""
+        """The proved speeds, at most `limit`, with the factors of impacts up to the speed `reach`."""
         least = np.full_like(limit, np.inf)
         for cycle in self.cycles:
             impacts = self._impacts(cycle, always, reach)
@@ -300,8 +299,8 @@ class _Law:
 
 
 def _factor(traced: Trace, side: int) -> tuple[int, Expr, Expr]:
-    """The side after an impact on `side` (0 where it is no fixed one), the derivative of the gap's speed after it to that before
-    it, as a function of that, and the velocity after an impact without speed.
+    """The side after an impact on `side` (0 if it is not fixed), the derivative of the gap's speed after the impact to the speed
+    before, as a function of the latter, and the velocity after an impact without speed.
     """
     leaf = {Expr("side"): float(side)}
     assert traced.gap_rate is not None

@@ -1,4 +1,4 @@
-"""Whether the flow of a system with one coordinate can make an area of states grow."""
+"""A proof that the flow of a system with one coordinate never enlarges areas of the state plane."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ VELOCITY = Expr("velocity", (), 0)
 def area_contraction(system: System) -> float | None:
     """The least rate -da/dv at which areas of the state plane shrink, over all sides, times and states; None if they may grow.
 
-    Along a motion over a time T an area changes by the factor exp(integral of da/dv) times, for each impact v+ = e v-, e^2. So
-    where -da/dv >= 0 everywhere and no impact raises the speed, the product of an orbit's two multipliers is at most 1, and a
-    complex pair never leaves the unit circle: there is no Neimark-Sacker bifurcation (errata 22). The bounds are of interval
-    arithmetic: sufficient, not necessary.
+    Along a motion an area changes by the factor exp(integral of da/dv), and by e^2 at each impact v+ = e v-. If -da/dv >= 0
+    everywhere and no impact raises the speed, the product of an orbit's two multipliers is at most 1, and a complex pair never
+    leaves the unit circle: there is no Neimark-Sacker bifurcation (errata 22). The rate is bounded by interval arithmetic, so
+    that None does not mean that areas do grow.
     """
     if len(system.model.coordinates) > 1 or system.model.held:
         return None
@@ -55,7 +55,7 @@ def _sides(traced: Trace) -> tuple[int, ...]:
 
 
 def _loses(traced: Trace, leaves: Leaves) -> bool:
-    """Whether no impact can raise the speed: the law is linear in it, with factors of at most 1."""
+    """Whether no impact can raise the speed, because the law is linear in the speed with factors of at most 1."""
     if traced.velocity_after is None:
         return True
     for side in _sides(traced):

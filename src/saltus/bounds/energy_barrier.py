@@ -1,4 +1,5 @@
-"""How far flights open under bounds of their pull: the energy that it takes, and the energy with which they come back."""
+"""The opening of a gap in a flight, from bounds of the pull: the energy that it takes, and the energy with which it comes
+back."""
 
 from __future__ import annotations
 
@@ -16,9 +17,9 @@ Work = tuple[Any, Any, Any]
 
 @dataclass(frozen=True)
 class ClimbSettings:
-    """How far and in how many steps a gap is opened."""
+    """The largest opening of a gap, and the steps in which it is opened."""
 
-    widest: float = 1e6  # The largest opening that is looked at.
+    widest: float = 1e6  # The largest opening that is considered.
     tries: int = 30  # The largest number of times that the first step is divided by 4, until it may be taken.
     steps: int = 20  # The largest number of steps over the opening, each at most a third of it.
 
@@ -27,7 +28,7 @@ CLIMB = ClimbSettings()
 
 
 def climb(pull: Bounds, slope: Bounds, allowed: Any) -> Work:
-    """Open a gap from 0 while the pull is above 0 at all times, and the ratio of the two works below `allowed`.
+    """Open a gap from 0 as long as the pull is positive at all times and the ratio of the two works is below `allowed`.
 
     Parameters
     ----------
@@ -36,13 +37,13 @@ def climb(pull: Bounds, slope: Bounds, allowed: Any) -> Work:
     slope
         Bounds of its derivative to w.
     allowed
-        (1, n).
+        The bound of the ratio of the works, (1, n).
 
     Returns
     -------
     Work
-        How far it opens, W, and lower and upper bounds of the work, int_0^W min_t(-A) dw and int_0^W max_t(-A) dw; arrays
-        (1, n), 0 where nothing is proved. For all smaller openings too, the ratio of the works is below `allowed`.
+        The opening W that is reached, and lower and upper bounds of the work, int_0^W min_t(-A) dw and int_0^W max_t(-A) dw;
+        arrays (1, n), 0 where nothing is proved. The ratio of the works is below `allowed` for all smaller openings too.
     """
     done: Work = (np.zeros_like(allowed), np.zeros_like(allowed), np.zeros_like(allowed))
     step = np.ones_like(allowed)
@@ -62,8 +63,8 @@ def climb(pull: Bounds, slope: Bounds, allowed: Any) -> Work:
 def _step(pull: Bounds, slope: Bounds, allowed: Any, done: Work, step: Any) -> tuple[Work, Any]:
     """The works after one more step, and whether it may be taken.
 
-    From the middle the pull changes by its slope: over a step h the work is h pull, to within h^2 / 8 of the slope's range.
-    Anywhere in the step the ratio of the works lies between that before it and that with the extreme pulls of the step.
+    Over a step h the work is h times the pull in the middle, to within h^2 / 8 times the range of the slope. Anywhere in the
+    step, the ratio of the works lies between the ratio before the step and the one with the extreme pulls of the step.
     """
     opening, lo, hi = done
     middle, change = pull(Interval(opening + step / 2)), slope(Interval(opening, opening + step))

@@ -1,4 +1,4 @@
-"""One side of a contact as an equation of its gap, w'' = A(t, w, u) with u = w', and bounds of what it is made of."""
+"""One side of a contact as an equation of its gap, w'' = A(t, w, u) with u = w', and bounds of A and its derivatives."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Interval arithmetic on a traced graph: bounds of an expression that hold for every value of its leaves in given ranges.
 
-Arrays of intervals run over parameter sets and cells of the time or the state. After every operation a bound moves outward by
-more than its rounding; zero stays zero, so that what is multiplied by 0 is exactly 0. (An underflow, below 1e-307, is not
-accounted for.) Where an operation leaves its domain the bounds are NaN, and no comparison with them holds: nothing is proved.
+Arrays of intervals run over parameter sets and over cells of the time or the state. After every operation the bounds are moved
+outward by more than their rounding; zero stays zero, so that a product with 0 is exactly 0. (Underflow, below 1e-307, is not
+accounted for.) If an operation leaves its domain the bounds are NaN; no comparison with NaN holds, so that nothing is proved.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class Interval:
         return outward(np.where(safe, 1 / self.hi, np.nan), np.where(safe, 1 / self.lo, np.nan))
 
     def square(self) -> Interval:
-        """x^2, which is not the product of two that vary apart."""
+        """x^2; the product x * x would be wider, as it treats its factors as independent."""
         low, high = self.lo * self.lo, self.hi * self.hi
         least = np.where((self.lo <= 0) & (self.hi >= 0), 0.0, np.minimum(low, high))
         return outward(least, np.maximum(low, high))
@@ -102,7 +102,8 @@ def enclose(roots: list[Expr], leaf: Callable[[Expr], Interval]) -> list[Interva
 
 
 def enclosed_along(root: Expr, leaf: Callable[[Expr], Interval], varied: Expr) -> Callable[[Interval], Interval]:
-    """`enclose` of an expression as a function of the range of one leaf; what does not depend on that is bounded once."""
+    """`enclose` of an expression as a function of the range of one leaf; parts that do not depend on the leaf are bounded
+    once."""
     depends = {id(varied)}
     fixed, others = [], []
     for node in _in_order(root):
@@ -126,12 +127,12 @@ def enclosed_along(root: Expr, leaf: Callable[[Expr], Interval], varied: Expr) -
 
 @lru_cache(maxsize=256)
 def _in_order(*roots: Expr) -> tuple[Expr, ...]:
-    """The nodes below some roots, operands first: the same few roots are bounded again and again."""
+    """The nodes below some roots, operands first; cached, as the same few roots are bounded many times."""
     return tuple(ordered(list(roots)))
 
 
 def _fill(values: dict[int, Interval], nodes: Iterable[Expr], leaf: Callable[[Expr], Interval]) -> None:
-    """Add the bounds of nodes, operands before what is made of them, to those that are known."""
+    """Add the bounds of nodes, which are given with operands first, to the known ones."""
     for node in nodes:
         if node.op == "number":
             values[id(node)] = Interval(node.value)
@@ -149,7 +150,7 @@ def _apply(node: Expr, x: list[Interval]) -> Interval:
 
 
 def _increasing(function: Any) -> Callable[[Interval], Interval]:
-    """A function that increases; where it has no value at the lower end, nothing is known of the upper one either."""
+    """An increasing function; if it has no value at the lower end, both bounds are NaN."""
 
     def bounds(x: Interval) -> Interval:
         low = function(x.lo)
@@ -193,7 +194,7 @@ def _pow(x: Interval, exponent: Interval) -> Interval:
 
 
 def _greater(x: Interval, y: Interval) -> Interval:
-    """1 where x > y for all their values, 0 where for none, [0, 1] where that is open."""
+    """1 where x > y for all their values, 0 where for none, and [0, 1] otherwise."""
     return Interval(np.where(x.lo > y.hi, 1.0, 0.0), np.where(x.hi <= y.lo, 0.0, 1.0))
 
 

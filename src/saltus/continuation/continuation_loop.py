@@ -1,4 +1,4 @@
-"""The loop of a continuation: step after step along a curve, to each event on the way and to an end that has a reason."""
+"""The loop of a continuation: it follows a curve step by step, through its events, up to an end for which it gives the reason."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Bounds = Mapping[str, tuple[float, float]]  # the least and the largest value of
 
 
 class Watch:
-    """Reports how much of a curve has been seen: of the range of its first parameter, or of the points it may have."""
+    """Reports the progress along a curve: the share of the range of its first parameter, or of the largest number of points."""
 
     def __init__(self, progress: Progress, bounds: Bounds, most_points: int) -> None:
         self.progress, self.names, self.most_points = progress, tuple(bounds), most_points
@@ -43,7 +43,7 @@ class Watch:
 
 @dataclass
 class Continuation:
-    """One direction of a curve while it is being followed."""
+    """The continuation of a curve in one direction: its settings, and the points and special points found so far."""
 
     bounds: Bounds
     events: Events
@@ -56,7 +56,8 @@ class Continuation:
     trail: Trail = field(init=False)
 
     def follow(self, first: Any, born: bool = False) -> None:
-        """Follow the curve from a point until it ends; `born` at a special point, whose own events are not to be found again."""
+        """Follow the curve from a point until it ends. `born` says that this is a special point of another curve, whose events
+        are not to be found again."""
         self.points.append(first)
         self.end, self.trail = self._on_a_bound(first), Trail(self.events, first)
         before, step = None, min(self.steps.first, self.steps.longest)
@@ -74,12 +75,12 @@ class Continuation:
                 self.end = End(CurveEnd.MOST_POINTS, self.points[-1].parameter, detail=str(self.steps.most_points))
 
     def course(self, start: End) -> Course[Any, Any]:
-        """The curve as it was followed, which began with an end for a reason of its own."""
+        """The curve as it was followed; `start` says why it begins where it does."""
         assert self.end is not None
         return Course(tuple(self.points), tuple(self.special), (start, self.end), tuple(self.missed))
 
     def _step(self, before: Any, point: Any, step: float) -> tuple[Any, float]:
-        """The next point, or what there is instead of one, and the length of the step after it."""
+        """The next point, or a cut or an end in its place, and the length of the step after it."""
         curve, length = point.curve, step
         while step > self.steps.least:
             length = min(step, curve.reach(point))
@@ -92,9 +93,9 @@ class Continuation:
         return self.events.stalled(self, point, length), step
 
     def _accept(self, point: Any, ahead: Any, born: bool) -> bool:
-        """Take a step up to the first of its events; returns whether the curve goes on with other equations.
+        """Accept a step up to its first event; returns whether the curve goes on with other equations.
 
-        The step is cut at the bounds first, as what happens outside of them is none of the curve's events.
+        The step is cut at the bounds first, so that events outside of them are not found.
         """
         bounded = self._beyond(point, ahead)
         if isinstance(bounded, End):
@@ -124,7 +125,7 @@ class Continuation:
         return self.end is None and cut is not None and self._cross(cut)
 
     def _cross(self, cut: Cut) -> bool:
-        """Go on beyond a cut; returns whether that is with other equations."""
+        """Go on beyond a cut; returns whether the curve then has other equations."""
         self.special += [] if cut.special is None else [cut.special]
         following = self.events.across(self, cut)
         if isinstance(following, End):
@@ -136,7 +137,7 @@ class Continuation:
         return following is not None
 
     def take(self, ahead: Any) -> None:
-        """Take a point ahead on the same equations, with the special points on the way to it."""
+        """Add a point ahead, with the same equations, and the special points on the way to it."""
         self._locate(self.trail.examined(self.trail.up_to([], ahead)))
         self.points.append(ahead)
 
@@ -175,7 +176,7 @@ class Continuation:
         return End(CurveEnd.BOUND, float(value), detail=f"{name} = " if len(self.bounds) > 1 else "")
 
     def _beyond(self, a: Any, b: Any) -> tuple[Any, End | None] | End:
-        """The point on the first bound that a step goes over or ends on, and the end there; an end alone if it is not found."""
+        """The point on the first bound that a step crosses or reaches, with the end there; an end alone if it is not found."""
         passed = [crossing for i in range(len(self.bounds)) for crossing in self._crossings(a, b, i)]
         if not passed:
             return b, self._on_a_bound(b)
@@ -185,7 +186,8 @@ class Continuation:
         return point, self._bound(list(self.bounds)[index], bound)
 
     def _crossings(self, a: Any, b: Any, i: int) -> list[tuple[int, float, Any]]:
-        """Where a step leaves the bounds of a parameter, if only to come back: its index, the bound and the point if found."""
+        """The places at which a step leaves the bounds of a parameter, even if it comes back: the parameter's index, the bound,
+        and the point if it is found."""
         index, found = i - len(self.bounds), []
         turn = turning_point(a, b, index)
         for bound, beyond in zip(list(self.bounds.values())[i], (np.less, np.greater), strict=True):
@@ -194,7 +196,7 @@ class Continuation:
         return found
 
     def _closes(self, a: Any, b: Any) -> bool:
-        """Whether a step goes by the first point of the curve, in the direction in which the curve was followed there."""
+        """Whether a step passes through the first point of the curve, in the direction in which the curve was followed there."""
         if len(self.points) <= 3:
             return False
         first, across, k = self.points[0], b.place - a.place, len(self.bounds)
@@ -211,7 +213,7 @@ class Continuation:
         moved = self.events.nearest(first, first.place + STEPS.ahead * first.tangent, b)
         if moved is None:
             return False
-        return float((moved - place) @ (b.curve.weights**2 * b.tangent)) > 0.0  # else it comes back along itself
+        return float((moved - place) @ (b.curve.weights**2 * b.tangent)) > 0.0  # otherwise the curve has turned round
 
 
 def both_ways(

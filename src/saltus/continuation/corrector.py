@@ -1,4 +1,4 @@
-"""Newton's method for a square system of equations, which knows when rounding stops it."""
+"""Newton's method for a square system of equations, with a criterion for convergence that takes rounding into account."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ import numpy as np
 class NewtonSettings:
     """When Newton's method has converged and when it is given up."""
 
-    converged: float = 5e-14  # residual relative to the unknowns: a few dozen roundings of what it is computed from
+    converged: float = 5e-14  # residual relative to the unknowns: a few dozen rounding errors
     stalled: float = 1e-10  # residual that is accepted where rounding keeps it above `converged`
-    slowdown: float = 0.3  # rounding does so where a step leaves more than this share of the residual before it
-    circling: float = 0.5  # share of the residual that two steps leave where the method goes round between two smooth parts
+    slowdown: float = 0.3  # rounding stops the method if a step leaves more than this share of the residual before it
+    circling: float = 0.5  # if two steps leave more than this share, the method circles between two smooth parts of the equations
     diverged: float = 1e6  # residual above which the iteration is given up
     longest: float = 1.0  # largest component of a step: beyond it the equations are far from linear
-    last: float = 1e-6  # residual after which one step is expected to be enough, as it squares it: then all is evaluated
+    last: float = 1e-6  # below this residual the next step is probably the last one, as it squares the error: evaluate thoroughly
 
 
 NEWTON = NewtonSettings()
@@ -42,7 +42,7 @@ Linear = Callable[[E, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 @dataclass(frozen=True)
 class Corrected(Generic[E]):
-    """Where Newton's method has converged, and what was evaluated there."""
+    """The place to which Newton's method has converged, with the equations evaluated there."""
 
     place: np.ndarray
     evaluation: E
@@ -57,8 +57,8 @@ def newton(
     Parameters
     ----------
     evaluate
-        The equations at (place, thorough), None where they have no value. The evaluation that is returned was a
-        thorough one, with all that is wanted to be known of a solution.
+        The equations at (place, thorough), None where they have no value. A thorough evaluation has all that is needed of a
+        solution; the one that is returned is thorough.
     linear
         The matrix and the right-hand side of the equations for a step, from an evaluation and its place.
     guess
@@ -66,8 +66,8 @@ def newton(
     iterations
         The most steps.
     rounded
-        The largest residual that rounding may leave where derivatives are large: it is accepted where it moves the unknowns by no
-        more than `converged`.
+        The largest residual that rounding may leave if derivatives are large. It is accepted if a further step would move the
+        unknowns by no more than `converged`.
     """
     place, before = guess.copy(), np.inf
     for iteration in range(iterations + 1):

@@ -22,12 +22,12 @@ Special = TypeVar("Special")
 @answering("is_joined", "solved_at", "solved_between")
 @dataclass(frozen=True, eq=False)
 class Course(Generic[Point, Special]):
-    """A curve as it was followed: its points in order, the special ones, the reasons for both ends."""
+    """A curve as it was followed: its points in order, its special points, and the reasons for both ends."""
 
     points: tuple[Point, ...]
     special: tuple[Special, ...]
     ends: tuple[End, End]
-    missed: tuple[Missed, ...]  # what is between neighbouring points and was not located
+    missed: tuple[Missed, ...]  # special points between neighbouring points that were noticed but not located
 
     @cached_property
     def parameters(self) -> np.ndarray:
@@ -41,9 +41,9 @@ class Course(Generic[Point, Special]):
         return self.ends[0].reason is CurveEnd.CLOSED
 
     def is_joined(self, before: int) -> bool:
-        """Whether the point of this number and the next are solutions of the same equations, in the same order of unknowns.
+        """Whether the point with this number and the next one solve the same equations, with the same order of unknowns.
 
-        A loop's last point is its first one again, with the equations with which it was begun.
+        The last point of a loop is its first one again, with the equations with which it was begun.
         """
         check_count("before", before, 0, len(self.points) - 2)
         a, b = self.points[before], self.points[before + 1]
@@ -53,12 +53,13 @@ class Course(Generic[Point, Special]):
         return bool(closing and a.curve.norm(b.place - a.place) <= 2.0 * STEPS.longest)
 
     def solved_at(self, value: float, index: int = -1) -> list[Point]:
-        """All its points at a value of one number of their places, solved there, in order."""
+        """All points of the curve at which one component of the place has a value, solved there, in order."""
         found = [point for i in self._around(value, index) for point in self.solved_between(i, value, index)]
         return found + [point for point in self.points[-1:] if point.place[index] == value]
 
     def _around(self, value: float, index: int) -> list[int]:
-        """The points between which and the next ones a number of the place may have a value: it lies between theirs, or turns."""
+        """The numbers of the points from which, to the next point, a component of the place may take a value: because the value
+        lies between theirs, or because the component has an extremum between them."""
         places, tangents = self._last if index == -1 else _numbers(self.points, index)
         beyond = places - value
         return np.flatnonzero((beyond[:-1] * beyond[1:] <= 0.0) | (tangents[:-1] * tangents[1:] < 0.0)).tolist()
@@ -68,7 +69,8 @@ class Course(Generic[Point, Special]):
         return _numbers(self.points, -1)
 
     def solved_between(self, before: int, value: float, index: int = -1) -> list[Point]:
-        """The points at a value of one number of the places, from the point of this number up to before the next."""
+        """The points at which one component of the place has a value, from the point with number `before` up to before the
+        next."""
         check_count("before", before, 0, len(self.points) - 2)
         a, b = self.points[before], self.points[before + 1]
         check_count("index", index, -a.place.size, a.place.size - 1)
@@ -76,7 +78,7 @@ class Course(Generic[Point, Special]):
 
 
 def _numbers(points: tuple[Any, ...], index: int) -> tuple[np.ndarray, np.ndarray]:
-    """One number of the places of points, and how it changes along the curve, (n,) each."""
+    """One component of the places of points, and its derivative along the curve, (n,) each."""
     for point in points:
         check_count("index", index, -point.place.size, point.place.size - 1)
     return np.array([point.place[index] for point in points]), np.array([point.tangent[index] for point in points])

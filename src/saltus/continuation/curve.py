@@ -1,4 +1,4 @@
-"""What the loop of a continuation needs to know of a curve: its norm, its points, and how to get from one to the next."""
+"""The interface of a curve to the loop of a continuation: its norm, its points, and the way from one point to the next."""
 
 from __future__ import annotations
 
@@ -62,14 +62,14 @@ class Curve(ABC, Generic[P]):
 
     @abstractmethod
     def solve(self, guess: np.ndarray, direction: np.ndarray) -> P | None:
-        """The point near a guess in the hyperplane through it normal to a direction of length 1."""
+        """The point near a guess, in the hyperplane through the guess that is normal to a direction of length 1."""
 
     @abstractmethod
     def solve_at(self, guess: np.ndarray, direction: np.ndarray, index: int = -1) -> P | None:
-        """The point near a guess with the guess's own value at an index of its place; its tangent goes along the direction."""
+        """The point near a guess that has the guess's value in the component `index`; its tangent points along the direction."""
 
     def beside_singular(self, place: np.ndarray, direction: np.ndarray) -> P | None:
-        """The point at a place that is one, with the direction of its tangent, where the equations may be singular."""
+        """The point at a place that solves the equations, with a given tangent, for use where the equations may be singular."""
         return self.solve(place, direction)
 
     @abstractmethod
@@ -78,14 +78,14 @@ class Curve(ABC, Generic[P]):
 
     @abstractmethod
     def turn(self, a: P, b: P) -> float:
-        """How much the curve changes from a point to the next, by which the length of the steps is controlled."""
+        """A measure of the change of the curve from a point to the next, by which the length of the steps is controlled."""
 
     def reach(self, point: P) -> float:
         """The longest step from a point that makes sense."""
         return math.inf
 
     def joins(self, other: Curve[P]) -> bool:
-        """Whether points of this curve and of the other one are solutions of the same equations."""
+        """Whether points of this curve and of the other one solve the same equations."""
         return self is other
 
     def norm(self, step: np.ndarray) -> float:

@@ -1,4 +1,4 @@
-"""Why a curve ends, as data whose text is a sentence."""
+"""The reasons why curves end, as data whose text is a sentence."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class CurveEnd(EndReason):
 
 @dataclass(frozen=True)
 class End:
-    """An end of a curve: its reason, with the parameter there, the kind of a special point and what else the sentence names.
+    """An end of a curve: its reason, the parameter there, and the special point and detail that its sentence mentions.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class End:
     kind
         The special point that is named in the reason, if there is one.
     detail
-        What else the sentence names.
+        A further word or number of the sentence.
 
     Examples
     --------

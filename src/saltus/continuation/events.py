@@ -1,4 +1,4 @@
-"""What a problem adds to the loop of a continuation: its test functions, where its equations change, and its own ends."""
+"""The part of a continuation that depends on the problem: its test functions, changes of its equations, and its own ends."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Cut:
-    """A point at which a step is cut short as the equations change there, and the special point that this may be."""
+    """A point at which a step is cut short because the equations change there, and the special point there, if it is one."""
 
     point: Any
     special: Zero | None
 
 
 class Events:
-    """What the problem adds to the loop. Each method may be replaced; as they are here nothing is special along a curve."""
+    """The hooks of the loop for a problem. Subclasses replace some methods; with those given here a curve has no events."""
 
     name = "curve"  # what the curve is called in the sentences of its ends
     keeps_special = False  # whether special points are points of the curve as well
@@ -36,11 +36,11 @@ class Events:
         return True
 
     def barrier(self, point: Any) -> TestFunction | None:
-        """A function that is below 0 where the equations of a point do not hold; its zeros are special points too."""
+        """A function that is negative where the equations of a point do not hold; its zeros are special points too."""
         return None
 
     def cut(self, point: Any, ahead: Any) -> Cut | End | None:
-        """Where a step is cut short, as the equations do not hold beyond: by default at the zero of the barrier."""
+        """The cut of a step beyond which its equations do not hold, by default at the zero of the barrier; None without one."""
         barrier = self.barrier(point)
         if barrier is None or barrier.value(ahead) >= 0.0:
             return None
@@ -52,7 +52,7 @@ class Events:
         return None
 
     def tests(self, point: Any) -> Iterable[TestFunction]:
-        """The test functions on the step that begins at a point."""
+        """The test functions for the step that begins at a point."""
         return ()
 
     def outside(self, point: Any) -> int | None:
@@ -60,7 +60,7 @@ class Events:
         return None
 
     def distinct(self, found: list[Zero]) -> list[Zero]:
-        """The special points of a step, each once: one point may be the zero of two test functions."""
+        """The special points of a step, each once, as one point may be the zero of two test functions."""
         return found
 
     def ended(self, run: Continuation, ahead: Any, cut: Cut | None) -> End | None:
@@ -72,11 +72,11 @@ class Events:
         return None
 
     def across(self, run: Continuation, cut: Cut) -> Any:
-        """Where the curve goes on beyond a cut: at another point, or, if None, as it is."""
+        """The point with which the curve goes on beyond a cut, or an end; None if it goes on with the same equations."""
         return None
 
     def first_step(self, points: Sequence[Any]) -> float:
-        """The longest first step with other equations, of a curve whose last point is the first one that solves them."""
+        """The longest first step after a change of equations; the last of the points is the first that solves the new ones."""
         return math.inf
 
     def stalled(self, run: Continuation, point: Any, step: float) -> Cut | End:
@@ -84,9 +84,10 @@ class Events:
         return End(CurveEnd.NO_STEP, point.parameter, detail=self.name)
 
     def nearest(self, point: Any, place: np.ndarray, other: Any) -> np.ndarray | None:
-        """A place, on the equations of `point`, renumbered to lie nearest to another point; None if it cannot be compared."""
+        """A place that solves the equations of `point`, in the unknowns that are nearest to those of `other`; None if the two
+        cannot be compared."""
         return place
 
     def closing(self, first: Any, ahead: Any) -> Any:
-        """The first point of a curve that closes, on the equations with which it comes back if they can be told."""
+        """The first point of a curve that closes, in the equations that the curve has when it returns, if that is possible."""
         return first

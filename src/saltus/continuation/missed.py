@@ -1,4 +1,4 @@
-"""What was not located along a curve, as data whose text is a sentence."""
+"""Special points along a curve that were noticed but not located, as data whose text is a sentence."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from saltus.enumerations import Sentence
 
 
 class MissedReason(Sentence):
-    """Why something is missing between two points. Its value is the text, in which a `Missed` fills in its numbers."""
+    """The reason why a special point was not located. Its value is the text, in which a `Missed` fills in its numbers."""
 
 
 class CurveMissed(MissedReason):
@@ -22,7 +22,7 @@ class CurveMissed(MissedReason):
 
 @dataclass(frozen=True, eq=False)
 class Missed:
-    """Something special between two neighbouring points of a curve that was not located.
+    """A special point between two neighbouring points of a curve that was noticed but not located.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Missed:
     last
         The parameters at the last point.
     detail
-        What else the sentence names.
+        A further word or number of the sentence.
 
     Examples
     --------

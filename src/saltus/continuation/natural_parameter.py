@@ -14,7 +14,7 @@ LOCATED_WITHIN = 1e-12  # relative precision of the parameter at an end or a cha
 
 
 class NaturalCurve(Curve[P]):
-    """A curve that is followed by its parameter itself, from bound to bound. Whether there is a solution is found by trying."""
+    """A curve that has the parameter as its coordinate, from bound to bound; whether a solution exists is found by trying."""
 
     count = 1
     scale: float  # of the parameter in the norm
@@ -27,11 +27,11 @@ class NaturalCurve(Curve[P]):
 
     @abstractmethod
     def at(self, value: float) -> P | None:
-        """The solution at a value of the parameter near to that which this curve was made for; None where there is none."""
+        """The solution at a value of the parameter near to the one for which this curve was made; None where there is none."""
 
     @abstractmethod
     def turn(self, a: P, b: P) -> float:
-        """How much two solutions differ."""
+        """A measure of the difference of two solutions."""
 
     def solve(self, guess: np.ndarray, direction: np.ndarray) -> P | None:
         """The solution at the parameter of the guess, whatever the direction."""
@@ -42,7 +42,7 @@ class NaturalCurve(Curve[P]):
         return self.at(float(guess[-1]))
 
     def advance(self, before: P | None, point: P, step: float) -> P | None:
-        """The solution a step further, which ends on the bound rather than beyond it."""
+        """The solution a step further; the step ends at the bound if it would lead beyond it."""
         ahead = self.at(self.ahead(point, step))
         return ahead if ahead is None or point.tangent[-1] > 0.0 else ahead.turned()
 
@@ -58,7 +58,7 @@ class NaturalCurve(Curve[P]):
         return abs(self._bound(point) - point.parameter) / self.scale
 
     def joins(self, other: Curve[P]) -> bool:
-        """Always: there is no other solution."""
+        """Whether two curves are one: always, as there is one solution at each value of the parameter."""
         return True
 
     def _bound(self, point: P) -> float:
@@ -66,9 +66,9 @@ class NaturalCurve(Curve[P]):
 
 
 def bisected(point: P, beyond: float, holds: Callable[[P], bool]) -> tuple[P, float]:
-    """The last point of a natural curve for which something holds, and the parameter hardly beyond at which it does not.
+    """The last point of a natural curve at which a condition holds, and a parameter just beyond at which it does not.
 
-    It holds at the given point, and does not at the parameter `beyond`, where there may be no solution at all.
+    The condition holds at the given point. It does not at the parameter `beyond`, where there may be no solution at all.
     """
     while abs(beyond - point.parameter) > LOCATED_WITHIN * max(abs(point.parameter), abs(beyond)):
         middle = 0.5 * (point.parameter + beyond)

@@ -1,4 +1,4 @@
-"""Where a curve is expected to be: on the cubic through two of its points with their tangents."""
+"""The prediction of the next point: on the cubic through the last two points with their tangents."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from saltus.continuation.step_length import STEPS
 def predicted(before: Point | None, point: Point, step: float) -> np.ndarray:
     """The place a step beyond a point, on the cubic through the last two points with their tangents.
 
-    Its error is of fourth order in the step. That of the tangent, which is all there is where there is no point before or where
-    the equations have changed since, is of second.
+    Its error is of fourth order in the step. If there is no point before, or the equations have changed since, the place is on
+    the tangent, with an error of second order.
     """
     straight = point.place + step * point.tangent
     if before is None or not before.curve.joins(point.curve):
@@ -22,7 +22,7 @@ def predicted(before: Point | None, point: Point, step: float) -> np.ndarray:
     if not 0.0 < step <= STEPS.most_stretched * length:
         return straight
     u = step / length
-    bend = point.tangent * length - chord  # the cubic is the tangent and what bends it: of second and of third order
+    bend = point.tangent * length - chord  # the deviation of the cubic from the tangent has terms of second and of third order
     twist = before.tangent * length - chord
     return np.asarray(straight + u**2 * (2.0 * bend + twist) + u**3 * (bend + twist))
 

@@ -15,10 +15,10 @@ from saltus.continuation.step_length import STEPS
 
 
 class EquationCurve(Curve[P]):
-    """A curve of equations: each point is predicted along the last ones and corrected by Newton's method in a hyperplane."""
+    """A curve of equations: each point is predicted from the last ones and corrected by Newton's method in a hyperplane."""
 
-    iterations = 7  # of Newton's method in a hyperplane: where it takes more the step is too long
-    iterations_at = 12  # and at a fixed number, where the guess may be farther away
+    iterations = 7  # the most iterations of Newton's method in a hyperplane: if it needs more, the step is too long
+    iterations_at = 12  # the most iterations with one component fixed, where the guess may be farther away
     # Share of a step: a corrector that leads farther than this from where the step was predicted is given up.
     stray: float = math.inf
     rounded: float = 0.0  # The largest residual that rounding may leave, where derivatives are large.
@@ -35,7 +35,7 @@ class EquationCurve(Curve[P]):
         return self.solve_within(guess, direction, math.inf)
 
     def solve_within(self, guess: np.ndarray, direction: np.ndarray, reach: float) -> P | None:
-        """`solve`, given up where Newton's method leads farther than `reach` from the guess or, if that is finite, in circles."""
+        """`solve`, but None if Newton's method leads farther than `reach` from the guess or, for a finite `reach`, in circles."""
         normal, errors = direction * self.weights**2, list[float]()
 
         def evaluate(place: np.ndarray, thorough: bool) -> Evaluation | None:
@@ -96,7 +96,7 @@ class EquationCurve(Curve[P]):
         return self.point_at(found, tangent / self.norm(tangent))
 
     def advance(self, before: P | None, point: P, step: float) -> P | None:
-        """The point a step further; None where Newton's method does not converge or leads away from what was predicted."""
+        """The point a step further; None if Newton's method does not converge, or converges too far from the predicted place."""
         guess = predicted(before, point, step)
         within = self.stray * step
         ahead = self.solve(guess, point.tangent) if within == math.inf else self.solve_within(guess, point.tangent, within)
@@ -111,7 +111,7 @@ class EquationCurve(Curve[P]):
 
 
 def bordered(rows: np.ndarray, last: Any) -> np.ndarray:
-    """An array (n, ...) with one more row below it; NumPy's own functions for it take longer than what a step computes."""
+    """An array (n, ...) with one more row below it; NumPy's functions for this would take longer than the rest of a step."""
     result = np.empty((len(rows) + 1, *rows.shape[1:]))
     result[:-1], result[-1] = rows, last
     return result

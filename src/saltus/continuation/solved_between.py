@@ -1,4 +1,5 @@
-"""Points of a curve between two others at which one number of their places has a given value, and no points of another curve."""
+"""Points of a curve, between two others, at which one component of the place has a given value; points of other curves
+excluded."""
 
 from __future__ import annotations
 
@@ -12,10 +13,10 @@ from saltus.continuation.test_functions import TestFunction, located
 
 
 def solved_between(a: Any, b: Any, index: int, value: float) -> list[Any]:
-    """The points from a up to before b at which the number at an index of the place has a value, solved there.
+    """The points from a up to before b at which the component `index` of the place has a value, solved there.
 
-    Each lies near the cubic through both: where the equations alone, at that value, lead to another solution, the curve is
-    followed to the value first.
+    Each lies near the cubic through a and b. If Newton's method at this value leads to another solution, the curve is followed to
+    the value first.
     """
     found = []
     for first, last in _rising_parts(a, b, index):
@@ -28,13 +29,13 @@ def solved_between(a: Any, b: Any, index: int, value: float) -> list[Any]:
 
 
 def _rising_parts(a: Any, b: Any, index: int) -> list[tuple[Any, Any]]:
-    """The way from a to b, divided where the number at an index turns."""
+    """The way from a to b, divided at the extremum of a component of the place."""
     turn = turning_point(a, b, index)
     return [(a, b)] if turn is None else [(a, turn), (turn, b)]
 
 
 def turning_point(a: Any, b: Any, index: int) -> Any:
-    """The point near which a number of the place turns between a and b; None if it does not."""
+    """The point near which a component of the place has an extremum between a and b; None if it has none."""
     if not a.tangent[index] * b.tangent[index] < 0.0:
         return None
     shares = np.linspace(0.0, 1.0, 33)
@@ -44,7 +45,7 @@ def turning_point(a: Any, b: Any, index: int) -> Any:
 
 
 def _solved(a: Any, b: Any, index: int, value: float) -> Any:
-    """The point between a and b at which a number that rises or falls all the way has a value; None if it cannot be found."""
+    """The point between a and b at which a component that is monotonic between them has a value; None if it cannot be found."""
     share = _share(a, b, index, value)
     point = _near(a, b, between(a, b, share), index, value)
     if point is not None:
@@ -56,7 +57,7 @@ def _solved(a: Any, b: Any, index: int, value: float) -> Any:
 
 
 def _near(a: Any, b: Any, guess: np.ndarray, index: int, value: float) -> Any:
-    """The solution at a value that is near to a guess and goes on in its direction; None if that is another one."""
+    """The solution at a value, near to a guess and with a tangent along a to b; None if Newton's method finds another one."""
     guess = guess.copy()
     guess[index] = value
     chord = b.place - a.place

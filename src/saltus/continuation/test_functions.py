@@ -17,15 +17,15 @@ from saltus.continuation.zero import Evidence, Zero
 class LocationSettings:
     """How a zero of a test function is bracketed."""
 
-    most_points: int = 80  # Points that are solved for: bisection alone needs 50 for a width of rounding.
-    rounding: float = 4e-15  # The narrowest bracket that is asked for, in which a few places differ by their rounding.
-    slow: int = 3  # After so many points that have not halved the bracket the next one is its middle.
-    overshoot: float = 0.5  # Share of the wanted width by which a point is put beyond the zero, so that it closes the bracket.
-    unsure: float = 0.1  # Share of the way to a zero by which it is unsure that two values before it alone tell.
-    halvings: int = 60  # Of the interval in which the zero of a power lies: to rounding.
-    nodes: int = 4  # Nearest points through which the inverse interpolation goes.
-    apart: float = 0.5  # Share of the distance of an end to a singular zero at which a further point is solved for.
-    near: float = 0.3  # Share of the distance of its neighbours by which a point may lie off the cubic through them.
+    most_points: int = 80  # The most points that are solved for; bisection alone needs 50 to reach rounding.
+    rounding: float = 4e-15  # The narrowest bracket that is aimed at: it has room for a few different numbers.
+    slow: int = 3  # After so many points that have not halved the bracket, the next one is its middle.
+    overshoot: float = 0.5  # A point is put beyond the expected zero by this share of the wanted width, to close the bracket.
+    unsure: float = 0.1  # The uncertainty of a zero that is extrapolated from two values before it, as a share of the way to it.
+    halvings: int = 60  # Bisections of the interval in which the zero of a power lies: down to rounding.
+    nodes: int = 4  # The number of nearest points for inverse interpolation.
+    apart: float = 0.5  # A further point is solved for at this share of the distance from an end to a singular zero.
+    near: float = 0.3  # How far a point may lie off the cubic through its neighbours, as a share of their distance.
 
 
 SETTINGS = LocationSettings()
@@ -37,11 +37,11 @@ class TestFunction:
 
     kind: str
     value: Callable[[Any], float]
-    width: float = 1e-11  # of the bracket of the zero, as a share of the step; the best point found in it is nearer still
+    width: float = 1e-11  # width of the bracket of the zero, as a share of the step; the best point in it is nearer still
     decisive: bool = False  # whether the count of `Events.outside` changes at its zeros
-    guides: bool = False  # whether it is smooth, so that a step is taken again, shorter, in which it changes unexpectedly
+    guides: bool = False  # whether it is smooth: a step in which it changes unexpectedly is then taken again, shorter
     singular: bool = False  # whether the equations are singular at its zeros, so that points beside them cannot be solved for
-    one_sided: bool = False  # whether it tells only on the side of the first point, as a power of the distance, where its zero is
+    one_sided: bool = False  # whether only its values before the zero, a power of the distance from it, show where the zero is
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class KnownPlace:
 def located(test: TestFunction, a: Any, b: Any, singular: bool = False) -> Zero | None:
     """The point between a and b at which a test function goes through zero; None if the curve cannot be followed between.
 
-    `singular` says that the equations are, somewhere between, where another curve crosses.
+    `singular` says that the equations are singular somewhere between, where another curve crosses.
     """
     known = [KnownPlace(0.0, a, test.value(a)), KnownPlace(1.0, b, test.value(b))]
     before, after = known[0].value, known[-1].value
@@ -72,7 +72,7 @@ def located(test: TestFunction, a: Any, b: Any, singular: bool = False) -> Zero 
         known.append(KnownPlace(share, point, value))
         known.sort(key=lambda place: place.share)
     i = _bracket(known, before) if before != 0.0 else 0
-    # beyond a zero that tells on one side only other equations hold, of which what is found before it must not be made up
+    # beyond the zero of a one-sided function other equations hold: points before it must not be interpolated with those beyond
     best = known[i] if test.one_sided else min(known[i : i + 2], key=lambda place: abs(place.value))
     evidence = Evidence(best.point.residual, _brackets(best.point, before, known), before, after, best.value)
     zero: Zero = best.point.zero_type(test.kind, best.point, evidence)
@@ -85,7 +85,7 @@ def _bracket(known: list[KnownPlace], before: float) -> int:
 
 
 def _next_share(known: list[KnownPlace], before: float, width: float, widths: list[float]) -> float | None:
-    """Where to look next for the zero, or None when it is bracketed: by inverse interpolation, or halfway if that is slow."""
+    """The next share to look at, or None if the zero is bracketed: by inverse interpolation, or halfway if that is slow."""
     i = _bracket(known, before) if before != 0.0 else 0
     low, high = known[i].share, known[i + 1].share
     width = max(width, SETTINGS.rounding)
@@ -100,13 +100,13 @@ def _next_share(known: list[KnownPlace], before: float, width: float, widths: li
     if not low < guess < high:
         guess = _inverse([low, high], [known[i].value, known[i + 1].value])
     beyond = SETTINGS.overshoot * width
-    guess += beyond if guess - low < high - guess else -beyond  # towards the farther end, so that it is drawn near as well
+    guess += beyond if guess - low < high - guess else -beyond  # towards the farther end, to move that end too
     guess = min(max(guess, low + beyond), high - beyond)
     return guess if low < guess < high else middle if low < middle < high else None
 
 
 def _next_share_from_one_side(known: list[KnownPlace], before: float, width: float, widths: list[float]) -> float | None:
-    """The same where only the values before the zero tell where it is: just beyond that, or, once that is known, before it."""
+    """`_next_share` for one-sided functions: just beyond the extrapolated zero, or, if such a point is known, just before it."""
     i = _bracket(known, before) if before != 0.0 else 0
     low, high = known[i].share, known[i + 1].share
     width = max(width, SETTINGS.rounding)
@@ -127,7 +127,8 @@ def _next_share_from_one_side(known: list[KnownPlace], before: float, width: flo
 
 
 def _extrapolated(places: list[KnownPlace], high: float) -> tuple[float, float]:
-    """Where a function that is about a power of the distance to its zero is 0, from places before, and how unsure that is."""
+    """The zero of a function that is nearly a power of the distance from it, extrapolated from places before, and the
+    uncertainty."""
     last = places[-1].share
     if len(places) < 3 or (zero := _zero_of_power(places[-3:], high)) is None:
         guess = _inverse([place.share for place in places[-2:]], [place.value for place in places[-2:]])
@@ -137,7 +138,7 @@ def _extrapolated(places: list[KnownPlace], high: float) -> tuple[float, float]:
 
 
 def _zero_of_power(places: list[KnownPlace], high: float) -> float | None:
-    """The zero before `high` of a power of the distance to it through three places; None where they are not on such a one."""
+    """The zero before `high` of a power of the distance from it, through three places; None if there is no such power."""
     shares, values = [place.share for place in places], [abs(place.value) for place in places]
     if not values[0] > values[1] > values[2] > 0.0:
         return None
@@ -151,7 +152,7 @@ def _zero_of_power(places: list[KnownPlace], high: float) -> float | None:
 
 
 def _inverse(shares: list[float], values: list[float]) -> float:
-    """The share at the value 0 on the polynomial of the shares in the values; nan where two values are equal."""
+    """The share at the value 0, by the polynomial of the shares as a function of the values; nan if two values are equal."""
     shares = list(shares)
     for order in range(1, len(shares)):
         for i in range(len(shares) - order):
@@ -176,9 +177,10 @@ def _solved(known: list[KnownPlace], share: float) -> Any:
 
 
 def _interpolated(test: TestFunction, known: list[KnownPlace]) -> Callable[[float], Any]:
-    """The points of the chord on the polynomial through points away from the zero, with their tangents: it is added two of them.
+    """A function that gives the points between two others by the polynomial through points away from the zero, with their
+    tangents; two such points are added to those known.
 
-    Where two curves cross, Newton's method does not tell them apart, and the more so the nearer it is.
+    Near a crossing of two curves Newton's method may converge to either of them, so that points cannot be solved for there.
     """
     from scipy.interpolate import KroghInterpolator
 
@@ -198,7 +200,7 @@ def _interpolated(test: TestFunction, known: list[KnownPlace]) -> Callable[[floa
 
 
 def _brackets(point: Any, before: float, known: list[KnownPlace]) -> tuple[float, ...]:
-    """How near to a zero the test function is known to have either sign, in each parameter."""
+    """The width, in each parameter, of the interval at whose ends the test function is known to have different signs."""
     sides: dict[bool, list[np.ndarray]] = {True: [], False: []}
     for place in known:
         sides[(place.value > 0) == (before > 0)].append(np.abs(place.point.parameters - point.parameters))

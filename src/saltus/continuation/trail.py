@@ -1,4 +1,4 @@
-"""The test functions along a curve: what they do between two points, and where one has to look so that no zero is lost."""
+"""The values of the test functions along a curve, and the search between two points that finds all of their zeros."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from saltus.continuation.predictor import arc, between
 
 @dataclass(frozen=True)
 class TrailSettings:
-    """How closely the test functions are looked at between two points of a curve."""
+    """How closely the test functions are examined between two points of a curve."""
 
-    most_looks: int = 40  # Points solved for within one step at most: more are needed only where a function is all but 0.
-    narrowest: float = 1e-6  # An interval narrower than this share of its step is not divided: two zeros in it are one.
-    # A step is taken again where a value differs from the parabola through the last three by more than this share of them.
+    most_looks: int = 40  # The most points solved for within one step; more would be needed only if a function is nearly 0 in it.
+    narrowest: float = 1e-6  # An interval narrower than this share of its step is not divided: two zeros in it count as one.
+    # A step is taken again if a value differs from the parabola through the last three by more than this share of them.
     unexpected: float = 0.5
-    doubt: float = 1.0  # The uncertainty of the cubic through four points, in units of its own term of third order.
+    doubt: float = 1.0  # The uncertainty of the cubic through four points, in units of its term of third order.
     grid: int = 17  # Places in an interval at which the cubic and its uncertainty are compared with 0.
-    inner: float = 0.1  # Shares of an interval nearer to its ends than this are not looked at, as little would be gained.
+    inner: float = 0.1  # A new point is no nearer to an end of the interval than this share of it: little would be gained.
 
 
 SETTINGS = TrailSettings()
@@ -43,9 +43,9 @@ class TrailPoint:
 class Trail:
     """The last points of a curve, with the values of its test functions.
 
-    Between two points a test function is taken to be the cubic through them and the two nearest ones. Its uncertainty is its own
-    term of third order, so a function that turns by more than the points before explain is uncertain. Where the cubic, within
-    its uncertainty, has more zeros than its ends tell, there the curve is solved for, until it has not.
+    Between two points a test function is approximated by the cubic through them and the two nearest other points. The cubic's
+    uncertainty is its term of third order, which is large where the function turns unexpectedly. If the cubic, within its
+    uncertainty, may have more zeros than its values at both ends show, a point between is solved for, and so on.
     """
 
     def __init__(self, events: Events, first: Any) -> None:
@@ -53,7 +53,7 @@ class Trail:
         self.begin(first)
 
     def begin(self, point: Any) -> None:
-        """Begin anew at a point, where the equations have changed."""
+        """Begin anew at a point at which the equations have changed."""
         self.barrier = self.events.barrier(point)
         self.tests = [*([] if self.barrier is None else [self.barrier]), *self.events.tests(point)]
         self.guides = np.array([test.guides for test in self.tests], dtype=bool)
@@ -63,7 +63,7 @@ class Trail:
         self.last = [self.latest]
 
     def explains(self, ahead: Any) -> bool:
-        """Whether the smooth test functions at a point ahead are about what their last three values let expect."""
+        """Whether the smooth test functions at a point ahead are near to the values extrapolated from their last three values."""
         if len(self.last) < 3 or not self.guides.any():
             return True
         (a, b, c), point = self.last, self._sample(ahead)
@@ -82,7 +82,7 @@ class Trail:
         self.last = [*self.last[:-1], *samples][-3:]
 
     def to_barrier(self, ahead: Any) -> list[TrailPoint]:
-        """The points of a step up to the first one at which the barrier is below 0."""
+        """The points of a step up to the first one at which the barrier is negative."""
         samples = self.up_to([], ahead)
         if self.barrier is None or samples[-1].values[0] < 0.0 or len(self.last) == 1:  # a curve may begin on the barrier
             return samples
@@ -98,7 +98,7 @@ class Trail:
         return [*(sample for sample in samples[:-1] or [before] if sample.arc < last.arc), last]
 
     def examined(self, samples: list[TrailPoint]) -> list[TrailPoint]:
-        """The points of a step with as many more between as are needed to see every zero of the test functions."""
+        """The points of a step, with as many further points between as are needed to see every zero of the test functions."""
         if samples is self.seen:
             return samples
         looks, i, known = 0, 0, self.last[:-1]
@@ -120,13 +120,14 @@ class Trail:
         return samples
 
     def explained(self, a: TrailPoint, b: TrailPoint) -> bool:
-        """Whether a count outside that differs at two points comes with a change of sign of a test function that decides."""
+        """Whether the counts of `Events.outside` at two points are equal, or a decisive test function changes its sign
+        between."""
         if a.outside == b.outside or None in (a.outside, b.outside):
             return True
         return bool((a.values * b.values <= 0.0)[self.decisive].any())
 
     def _middle(self, a: TrailPoint, b: TrailPoint, share: float) -> TrailPoint | None:
-        """The sample at a share of the way between two, or None where the curve cannot be solved for."""
+        """The trail point at a share of the way between two, or None if the curve cannot be solved for there."""
         chord = b.point.place - a.point.place
         curve = a.point.curve
         point = curve.solve(between(a.point, b.point, share), chord / curve.norm(chord))
@@ -136,19 +137,20 @@ class Trail:
         return self._at(point, a.arc + (b.arc - a.arc) * first / (first + second))
 
     def _sample(self, ahead: Any) -> TrailPoint:
-        """A point ahead of the last one."""
+        """A point ahead of the last one, as a trail point."""
         if self.latest.point is not ahead:
             before = self.last[-1]
             self.latest = self._at(ahead, before.arc + arc(before.point, ahead))
         return self.latest
 
     def _at(self, point: Any, length: float) -> TrailPoint:
-        """A point at a length of the curve, with all that is to be known of it."""
+        """A point at a length along the curve, with the values of all test functions."""
         return TrailPoint(point, length, np.array([test.value(point) for test in self.tests]), self.events.outside(point))
 
 
 def _where_to_look(a: TrailPoint, b: TrailPoint, near: Sequence[TrailPoint]) -> float | None:
-    """The share of the way from a to b at which a test function may have zeros that its values at both ends do not tell."""
+    """The share of the way from a to b at which a test function may have zeros that its values at both ends do not show; None if
+    there is no such place."""
     begin, end = a.values, b.values
     with np.errstate(all="ignore"):
         rise = end - begin
@@ -173,9 +175,9 @@ def _where_to_look(a: TrailPoint, b: TrailPoint, near: Sequence[TrailPoint]) -> 
 
 
 def _higher(a: TrailPoint, b: TrailPoint, near: Sequence[TrailPoint]) -> tuple[np.ndarray, ...]:
-    """The coefficients of second and third order, the uncertainty of either, and the lever of the last two over the grid.
+    """The coefficients of second and third order, the uncertainty, and the factor of the last two at the places of the grid.
 
-    Without two points near it is the last term known that is uncertain: of the straight line half of its rise.
+    With fewer than two further points the last known term is the uncertain one; for a straight line this is half of its rise.
     """
     begin, end, length = a.values, b.values, b.arc - a.arc
     slope, nothing, everywhere = (end - begin) / length, np.zeros(len(begin)), np.ones(GRID.size)

@@ -1,4 +1,4 @@
-"""Where motions are going: the periodic orbit that their stroboscopic states approach as a linear map does, extrapolated."""
+"""The periodic orbit that a motion approaches, extrapolated from its stroboscopic states as iterates of a linear map."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ import numpy as np
 
 @dataclass(frozen=True)
 class ApproachSettings:
-    """When states are taken to approach an orbit."""
+    """When the states of a motion are taken to approach an orbit."""
 
-    # The largest error of what the map predicts of the last step between two states, relative to that step. The orbit is then off
-    # by about this share of the way to it, and the next extrapolation, from nearer, by its square.
+    # The largest error with which the map may predict the last step between two states, relative to that step. The extrapolated
+    # orbit has an error of about this share of the way to it; the next extrapolation begins nearer, with the square of this.
     linear: float = 0.02
-    # The largest multiplier of the map. It keeps an extrapolation from orbits that are not stable: a map that has been read to
-    # within 2 % cannot show 0.95 where a multiplier is 1, and along an unstable direction a state is not moved.
+    # The largest multiplier of the map. It excludes extrapolation to orbits that are not stable: with an error of 2 % the map
+    # cannot show 0.95 where a multiplier is 1, and no state is moved along an unstable direction.
     multiplier: float = 0.95
-    # The longest way to the orbit, as a share of the size of the states: from farther away it may lead into another basin.
+    # The longest way to the orbit, as a share of the size of the states: a longer one may lead into another basin.
     reach: float = 0.2
-    # Steps below this share of the size of the states are mostly rounding and the errors of the motions.
+    # Steps below this share of the size of the states consist mostly of rounding and of the errors of the motions.
     least: float = 1e-9
-    # Two steps whose directions have a smaller sine between them are parallel: then one multiplier is read off them, not two.
+    # Two steps are parallel if the sine of the angle between them is smaller than this: they then give one multiplier, not two.
     parallel: float = 1e-3
 
 
@@ -29,23 +29,23 @@ SETTINGS = ApproachSettings()
 
 
 def approached(states: np.ndarray, longest: int) -> tuple[np.ndarray, np.ndarray]:
-    """The states on the orbits that motions approach, and after how many forcing periods these repeat; 0 where there is none.
+    """The states on the orbits that motions approach, and the periods of these orbits; 0 for a motion that approaches none.
 
-    If s_k are the states q forcing periods apart, d_k = s_k - s_(k-1), and M is the linear map with d_(k+1) = M d_k for the two
-    steps before the last, the orbit is at s + M (1 - M)^-1 d after the last one. It is believed if M predicts the last step too
-    and is a contraction. The fewest periods q up to `longest` are taken for which 4 q + 1 states are there.
+    Let s_k be states q forcing periods apart, d_k = s_k - s_(k-1), and M the linear map that takes d_1 to d_2 and d_2 to d_3. If
+    M also predicts the last step, d_4 = M d_3, and is a contraction, the orbit is at s_4 + M (1 - M)^-1 d_4. The shortest period
+    q up to `longest` is taken for which this holds; it needs 4 q + 1 states.
 
     Parameters
     ----------
     states
-        (n, kept, 2), coordinate and velocity at the ends of the last forcing periods, the last one last.
+        Coordinate and velocity at the ends of the last forcing periods, in the order of time, (n, kept, 2).
     longest
-        The longest period looked for.
+        The longest period that is looked for.
 
     Returns
     -------
     tuple[np.ndarray, np.ndarray]
-        (n, 2): the last states, or what they approach; (n,): the periods.
+        The states on the orbits, or the last states of motions that approach none, (n, 2); and the periods, (n,).
     """
     limit, period = states[:, -1].copy(), np.zeros(len(states), dtype=int)
     size = np.nanmax(np.abs(states), axis=1, initial=0.0).max(axis=1)
@@ -57,7 +57,7 @@ def approached(states: np.ndarray, longest: int) -> tuple[np.ndarray, np.ndarray
 
 
 def _limits(states: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What five states each, (n, 5, 2), approach, and whether they do."""
+    """The states that sequences of five states, (n, 5, 2), approach, and whether they do approach them."""
     steps = np.diff(states, axis=1)
     length = np.linalg.norm(steps, axis=2)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -72,8 +72,8 @@ def _limits(states: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def _maps(steps: np.ndarray, length: np.ndarray) -> np.ndarray:
-    """The linear maps (n, 2, 2) that take the first of steps (n, 4, 2) to the second and this to the third, or where these are
-    parallel, that project onto the second and multiply."""
+    """The linear maps (n, 2, 2) that take the first of the steps (n, 4, 2) to the second, and the second to the third. If the
+    first two are parallel, the map takes the second step to the third, and directions orthogonal to the second to 0."""
     one, two, three = steps[:, 0], steps[:, 1], steps[:, 2]
     area = _det(one, two)
     inverse = np.stack([np.stack([two[:, 1], -two[:, 0]], axis=1), np.stack([-one[:, 1], one[:, 0]], axis=1)], axis=1)

@@ -1,7 +1,7 @@
-"""Impacts without loss, too small and too many to follow: the averaged law.
+"""Chatter: impacts without loss that are too small and too many to be followed, by the averaged law of their speed.
 
-With the speeds v_s proportional to one speed v, the action v^2 sum v_s / abs(a_s) decays at the mean of the damping over the
-duration of a cycle, sum g_s v_s / abs(a_s) / sum v_s / abs(a_s), for any loads that press. The phase is lost.
+The speeds v_s on the sides s are proportional to one speed v. The action v^2 sum v_s / abs(a_s) decays with the mean damping over
+a cycle, sum g_s v_s / abs(a_s) / sum v_s / abs(a_s), under any load that presses both contacts. The phase of the impacts is lost.
 
 Its compiled part goes into one module with that of `kernel.py`.
 """
@@ -21,7 +21,7 @@ from saltus.taylor import lean_jit
 
 @lean_jit
 def chatter_sums(where, env, model, work, h, x, factor, t, origin):
-    """The sums over the sides of g v / abs(a) and v / abs(a), g the damping, for unit speed, at x of a step."""
+    """The sums over the sides of g v / abs(a) and v / abs(a), with the damping g, for unit speed, at the share x of a step."""
     b, order = work[Work.CONTACT], where[Where.ORDER]
     damping, duration = 0.0, 0.0
     for i in range(where[Where.SIDES]):

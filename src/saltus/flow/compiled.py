@@ -1,4 +1,4 @@
-"""What is compiled for the flow of one motion: one kernel for all models, and the functions of each structure."""
+"""The compiled code with which one motion is followed: one kernel for all models, and the functions of each structure."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ from saltus.taylor import (
     tape,
 )
 
-MOST_COEFFICIENTS = 24  # of a series at the tightest tolerance, whose order is 21, with one to spare for a pair of orders
+MOST_COEFFICIENTS = 24  # length of a series at the tightest tolerance: order 21, hence 23 coefficients, rounded up to pairs
 _SIGNATURES = f"""import math
 
 import numpy as np
@@ -80,12 +80,12 @@ class Structure:
     """The compiled functions of a traced structure, and its sizes."""
 
     module: ModuleType
-    # What the kernel calls: series, contact_series, reset, contact_damping, tangent; with several contacts series, matrices,
-    # matrix_slopes, tangent.
+    # The functions that the kernel calls: series, contact_series, reset, contact_damping, tangent; with several contacts series,
+    # matrices, matrix_slopes, tangent.
     functions: tuple[Any, ...]
     constants: Callable[..., None]
-    geometry: Callable[..., None] | None  # of the one contact
-    signs: tuple[int, ...] = ()  # of these contacts
+    geometry: Callable[..., None] | None  # of a model with one contact; None with several
+    signs: tuple[int, ...] = ()  # of the contacts, if there are several
     frictions: int = 0
 
     def prepare(self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
@@ -102,14 +102,15 @@ class Structure:
 
     @cached_property
     def tables(self) -> tuple[Any, ...]:
-        """`constants`, and `geometry` or with several contacts `matrices`, as the lanes' driver calls them."""
+        """Pointers to `constants` and to `geometry` (with several contacts `matrices`), which the lanes' driver calls."""
         return tuple(
             pointer(getattr(self.module, name)) for name in ("constants", "matrices" if self.geometry is None else "geometry")
         )
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """Coordinates, margins, rows of the workspace, sides, whether steps are checked, the model's coordinates, columns."""
+        """The numbers of coordinates with the tangent's, margins, rows of the workspace and sides; whether steps are checked; and
+        the numbers of the model's own coordinates and of columns of the tangent."""
         return tuple(getattr(self.module, name) for name in ("DOF", "STOPS", "ROWS", "SIDES", "STEEP", "OWN", "COLUMNS"))
 
 
@@ -147,14 +148,14 @@ def contacts_module() -> ModuleType:
 
 @cache
 def load_segments() -> tuple[Callable[..., int], Callable[..., None]]:
-    """What periodic orbits are solved with: `follow_segments` and `impact_equations` of `segments.py`."""
+    """The functions with which periodic orbits are solved: `follow_segments` and `impact_equations` of `segments.py`."""
     module = load_module("segments", _text(kernel_layout, roots, steps, contact, contact_side, chatter, segments))
     return entry_point(module.follow_segments), entry_point(module.impact_equations)
 
 
 @cache
 def load_contact_segments() -> Callable[..., int]:
-    """What orbits with several contacts are solved with: `follow_contact_segments` of `contacts/contact_segments.py`."""
+    """The function with which orbits with several contacts are solved, `follow_contact_segments` of `contact_segments.py`."""
     parts = (contact_layout, solver_memory, complementarity, contact_impacts, contact_tangent, segment_extremes, contact_segments)
     return entry_point(load_module("contact_segments", _text(kernel_layout, roots, steps, *parts)).follow_contact_segments)
 
@@ -216,7 +217,7 @@ def _source(sizes: dict[str, int], functions: list[str]) -> str:
 
 
 def constants(trace: Trace) -> dict[Expr, int]:
-    """Where the table of constants has the parts of a structure's expressions that depend on parameters alone."""
+    """The table of constants: the parts of a structure's expressions that depend on parameters alone, with their places."""
     roots = [*trace.acceleration, *motion_roots(trace), *_geometry(trace), *trace.contact_numbers]
     roots += [
         x for x in (trace.contact_acceleration, trace.next_side, trace.velocity_after, trace.contact_damping) if x is not None
@@ -230,7 +231,7 @@ def constants(trace: Trace) -> dict[Expr, int]:
 
 
 def motion_roots(trace: Trace) -> list[Expr]:
-    """Gap, reactions and margins of a trace, without accelerations as leaves: their series are made with the motion's."""
+    """Gap, reactions and margins of a trace, with the accelerations substituted: their series are computed with the motion's."""
     accelerations = {Expr("acceleration", (), i): a for i, a in enumerate(trace.acceleration[: trace.dof])}
     return [
         *([] if trace.gap is None else [trace.gap]),
@@ -239,7 +240,7 @@ def motion_roots(trace: Trace) -> list[Expr]:
 
 
 def one_free(trace: Trace) -> OneFree | None:
-    """The equations of a trace with several contacts where one coordinate is free, if it has such."""
+    """The equations of motion of a trace with several contacts while one coordinate is free; None if it has none."""
     if trace not in _one_free:
         _one_free[trace] = equations_of_one_free(trace, motion_roots(trace)[len(trace.reactions) :])
     return _one_free[trace]
@@ -268,7 +269,7 @@ def _series(trace: Trace, known: dict[Expr, int]) -> str:
 
 
 def _free(trace: Trace) -> dict[str, tuple[str, int]]:
-    """Where it stands which way frictions slide, and which coordinates are free."""
+    """The places behind the parameters that hold in which direction each friction slides, and whether each coordinate is free."""
     first = len(trace.parameters)
     return {"slide": ("parameters", first), "free": ("parameters", first + len(trace.rubbed))}
 
@@ -290,20 +291,20 @@ def _matrices(trace: Trace, known: dict[Expr, int]) -> str:
 
 
 def _matrix_slopes(trace: Trace, known: dict[Expr, int]) -> str:
-    """The derivatives of what `matrices` fills along each column, one column after the other."""
+    """The derivatives, along each column of the tangent, of the numbers that `matrices` fills; one column after the other."""
     roots, places = event_derivatives.number_slopes(trace), Places(("env", "piece", "state", "out"), ENV | HERE)
     cases = [Case(tape(roots, known), [("out", i) for i in range(len(roots))])] if roots else []
     return function_text("matrix_slopes", places, "SCALAR", cases)
 
 
 def _at_impact(name: str, arguments: tuple[str, ...], roots: list[Expr], known: dict[Expr, int]) -> str:
-    """A function that returns the values of expressions at an instant, of the velocity `v0`."""
+    """A function that returns the values of expressions at an instant, for the velocity `v0`."""
     places = Places(arguments, LEAVES | {"velocity": ("v0", 0)})
     return function_text(name, places, "SCALAR", [Case(tape(roots, known), [None] * len(roots))])
 
 
 def _tangent(trace: Trace, known: dict[Expr, int]) -> str:
-    """What each event makes of the tangent's columns, in the kernel's state: `State` says where they are there."""
+    """The function that transforms the tangent's columns, in the kernel's state (see `State`), at each kind of event."""
     count, first = len(trace.acceleration), State.COORDINATES.value
     starts = {"coordinate": first, "velocity": first + count, "shift": first + 2 * count}
     state = {op: ("state", start) for op, start in starts.items()}

@@ -1,4 +1,4 @@
-"""At the contact: rest and release, impacts, and what small impacts are the end of.
+"""The events at the contact: impacts, rest and release, and the ends of accumulations of impacts.
 
 Its compiled part goes into one module with that of `kernel.py`, whose docstring defines `env`, `model` and `work`.
 """
@@ -61,11 +61,11 @@ def contact_accelerations(where, env, model, work, t, origin):
 
 @lean_jit
 def leave_or_stay(where, state, env, model, work, origin):
-    """Decide where a system at rest at contact goes: on an ARC, or into REST. False if that is not unique.
+    """Decide whether a system at rest at the contact leaves it on an ARC or stays in REST. False if that is not unique.
 
-    On each side the first non-zero Taylor coefficient of the contact acceleration decides; `SKIP` names the side, if any, on
-    which it has just been found to be zero. If both sides point outward the motion is not unique, unless the caller has
-    named the side.
+    On each side the sign of the first non-zero Taylor coefficient of the contact acceleration decides; `SKIP` holds the side, if
+    any, on which the acceleration has just been found to be zero. If both sides point outward the motion is not unique, unless
+    the caller has given the side (`LEAVE_BY`).
     """
     b, order, released, outward = work[Work.CONTACT], where[Where.ORDER], where[Where.SKIP], 0
     contact_accelerations(where, env, model, work, state[State.TIME], origin)
@@ -91,13 +91,13 @@ def contact_pull(side, env, model, piece, work, t, origin):
 
 @lean_jit
 def accumulation(where, env, model, work, speed, t, origin, tol):
-    """What a small impact at the contact is the end of: (mode, time left).
+    """The mode that follows a small impact, and, for an accumulation, the time left until its end.
 
-    ARC: of nothing. REST: of a Zeno accumulation. From the gap's speed v on side s the time left is
+    REST: impacts accumulate soon. From the gap's speed v on side s the time left is
     2 v (1/abs(a_s) + e1/abs(a_n)) / (1 - e1 e2), with a_s, a_n the contact accelerations on this and on the next side and e1, e2
-    the factors of the next two impacts; its error is of the order of the time left, squared, times the relative rate of
-    change of the accelerations. CHATTER: of impacts without loss, below CHATTER_SPEED, while the
-    accelerations change slowly over two of them.
+    the factors of the next two impacts; its error is of the order of the square of the time left times the relative rate of
+    change of the accelerations. CHATTER: impacts lose nothing, are slower than CHATTER_SPEED, and the accelerations change slowly
+    over two of them. ARC: neither of these.
     """
     side, piece = float(where[Where.SIDE]), where[Where.PIECE]
     here, slope_here = contact_pull(side, env, model, piece, work, t, origin)
@@ -125,15 +125,15 @@ def accumulation(where, env, model, work, speed, t, origin, tol):
 
 @lean_jit
 def slow_speed(tol):
-    """The speed of the gap after an impact below which it may be the end of an accumulation."""
+    """The speed of the gap after an impact below which the end of an accumulation may be near."""
     return max(SLOW * math.sqrt(tol), CHATTER_SPEED)
 
 
 @lean_jit
 def rest_columns(where, state, env, model, work, events, t, origin, tol):
-    """The tangent at rest, which begins at once: after an impact that leaves no speed it moves as that impact does.
+    """The tangent at rest that begins at once; after an impact that leaves no speed, its instant moves as that of the impact.
 
-    A state next to one at rest comes to rest soon, unless impacts lose nothing: then there is no derivative to the state.
+    A motion that begins next to rest comes to rest soon, unless impacts lose nothing: then there is no derivative to the state.
     """
     mode, _ = accumulation(where, env, model, work, TINY, t, origin, tol)
     detail = RestDetail.AT_ONCE if mode == Mode.REST else RestDetail.NEVER_AGAIN
@@ -144,7 +144,8 @@ def rest_columns(where, state, env, model, work, events, t, origin, tol):
 
 @lean_jit
 def release_columns(where, state, env, model, events, t, origin):
-    """How a release moves: with the contact acceleration's simple root, and not with a jump of the load, which has its time."""
+    """The tangent at a release. Its instant moves with the simple root of the contact acceleration; if a jump of the load
+    releases the system, the instant is fixed."""
     breaks, piece = env[2], where[Where.PIECE]
     detail = ReleaseDetail.AT_A_ROOT if where[Where.SKIP] <= 3 else ReleaseDetail.AT_NONE
     if where[Where.SKIP] == 2 and piece > 0 and abs(breaks[piece - 1] - origin - t) < 1e-12 * max(1.0, abs(origin)):
@@ -158,7 +159,7 @@ def release_columns(where, state, env, model, events, t, origin):
 
 @lean_jit
 def decide_at_rest(where, state, settings, env, model, work, events, origin):
-    """At rest at contact: stay or leave. Returns PAUSED to go on, or NOT_UNIQUE."""
+    """Decide whether a system at rest at the contact stays or leaves. Returns PAUSED to go on, or NOT_UNIQUE."""
     t = state[State.TIME]
     if not leave_or_stay(where, state, env, model, work, origin):
         return Status.NOT_UNIQUE
@@ -177,7 +178,7 @@ def decide_at_rest(where, state, settings, env, model, work, events, origin):
 
 @lean_jit
 def end_accumulation(where, state, env, model, work, steps, events, origin, left, t_end):
-    """Come to rest after the time `left`, in which the rest of the impacts take place."""
+    """Come to rest after the time `left`, within which all further impacts of the accumulation take place."""
     q, t = work[Work.POSITIONS], state[State.TIME]
     record_event(where, events, EventCode.RESTING, 0, 0, t + left, 0.0, 0.0)
     if where[Where.COLUMNS] > 0:
@@ -191,7 +192,7 @@ def end_accumulation(where, state, env, model, work, steps, events, origin, left
 
 @lean_jit
 def decide(where, state, settings, env, model, work, steps, events, origin, t_end):
-    """At contact: find the next mode. Returns PAUSED to go on, or why the motion ends."""
+    """Find the next mode of a system at the contact. Returns PAUSED to go on, or why the motion ends."""
     t, velocity, tol = state[State.TIME], state[State.COORDINATES + where[Where.DOF]], settings[Setting.TOLERANCE]
     if velocity == 0.0:
         return decide_at_rest(where, state, settings, env, model, work, events, origin)
@@ -219,7 +220,7 @@ def impact(where, state, env, model, events, t, origin, before):
     state[State.TIME] = t
     set_state(where, state, contact, before)
     where[Where.MODE], where[Where.SKIP], where[Where.HELD] = Mode.CONTACT, 0, 0
-    if rate_of(model, side) * before >= 0.0:  # a triple contact to within the working precision: no speed is left
+    if rate_of(model, side) * before >= 0.0:  # a triple root of the gap within rounding: there is no closing speed
         set_state(where, state, contact, 0.0)
         record_event(where, events, EventCode.GRAZING, where[Where.SIDE], GrazingDetail.TRIPLE, t, before, 0.0)
         forget(where, state)

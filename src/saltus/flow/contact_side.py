@@ -1,4 +1,4 @@
-"""On which side of its contact a state moves on: the one rule for single motions and for lanes.
+"""The side of the contact on which a state moves on: one rule for single motions and for lanes.
 
 Its compiled part goes into one module with that of `ensemble/driver.py`; `simulation.py` calls it as plain Python.
 """
@@ -13,10 +13,10 @@ from saltus.taylor import lean_jit
 
 @lean_jit
 def side_of_state(sides, position, velocity, geometry):
-    """The mode and the side of a state: by the gap, at contact by the velocity, and at rest there CONTACT decides.
+    """The mode and the side of a state: from the gap; at the contact from the velocity; at rest there the mode CONTACT decides.
 
-    The mode is BEYOND where the state lies on no side of the contact. An arc that starts at the contact with a velocity that
-    points outward of every side begins with its impact.
+    The mode is BEYOND if the state lies on no side of the contact. A motion that starts at the contact with a velocity that
+    closes the gap of every side is on an ARC that begins with its impact.
     """
     if sides == 0:
         return Mode.ARC, 1

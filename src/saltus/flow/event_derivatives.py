@@ -1,6 +1,7 @@
-"""What the events of a motion make of the tangent's columns, and by how much each event moves, as expressions of a trace.
+"""The saltation of the tangent's columns at the events of a motion, and the shift of each event, as expressions of a trace.
 
-The time of an event moves by dt for a unit of the number c that a column is the derivative to, and there the column jumps.
+A column holds the derivatives to a number c, an initial value or a parameter. The shift dt is the derivative of an event's time
+to c; at the event the column jumps.
 """
 
 from __future__ import annotations
@@ -27,10 +28,10 @@ NONE = number(math.nan)
 
 @dataclass(frozen=True)
 class Saltation:
-    """What an impact makes of the tangent, one expression for each column.
+    """The tangent after an impact, one expression for each column.
 
-    They are expressions of the tangent's coordinates and velocities before the impact, of velocity 0 (the model's own, v-, before
-    the impact), the time, the origin, the side before the impact and the parameters.
+    The leaves of these expressions are the tangent's coordinates and velocities before the impact, the model's own velocity v-
+    before it (as velocity 0), the time, the origin, the side before the impact and the parameters.
     """
 
     coordinate: list[Expr]  # u+
@@ -39,9 +40,9 @@ class Saltation:
 
 
 def changes(trace: Trace) -> list[tuple[EventCode, int, dict[Expr, Expr]]]:
-    """(kind, detail, what becomes of the tangent's leaves) of every event that the structure can have.
+    """For every event that the structure can have: its kind, its detail, and the new expressions of the tangent's leaves.
 
-    The leaf "shift" of a column is by how much the event moves.
+    The leaf "shift" of a column is the shift of the event.
     """
     if trace not in _changes:
         _changes[trace] = _derive_changes(trace)
@@ -52,7 +53,7 @@ _changes: WeakKeyDictionary[Trace, list[tuple[EventCode, int, dict[Expr, Expr]]]
 
 
 def _derive_changes(trace: Trace) -> list[tuple[EventCode, int, dict[Expr, Expr]]]:
-    """`changes`, which several functions of a structure are written from."""
+    """`changes`, derived once: several functions of a structure are written from them."""
     events = [(EventCode.LIMIT, i, _shifts(margin_shift(trace, margin))) for i, margin in enumerate(trace.margins.values())]
     events += [(EventCode.RELEASE, i, _shifts(reaction_slopes(trace, reaction))) for i, reaction in enumerate(trace.reactions)]
     if trace.gap is None:
@@ -81,7 +82,8 @@ def _derive_changes(trace: Trace) -> list[tuple[EventCode, int, dict[Expr, Expr]
 
 
 def _reset_slopes(trace: Trace) -> dict[Expr, Expr]:
-    """u = x_c, z = R_v z + R_c, and R_t as the shift: v+ = R(v-, t, c) at x(c) as its arguments change, whenever that may be."""
+    """The derivatives of the reset v+ = R(v-, t, c) at x(c) alone, at a fixed instant: u = x_c, z = R_v z + R_c, and R_t as the
+    shift."""
     assert trace.velocity_after is not None
     reset, places = trace.velocity_after, dict[Expr, Expr]()
     slope, drift = differentiate(reset, Expr("velocity", (), 0)), time_derivative(trace, reset)
@@ -127,15 +129,15 @@ def saltation(trace: Trace) -> Saltation:
 
 
 def contact_shift(trace: Trace, j: int) -> Expr:
-    """x_c: how the point of contact moves with column j's parameter. At rest there it is u, and z is 0."""
+    """The derivative x_c of the point of contact to column j's parameter. At rest there, u is x_c and z is 0."""
     assert trace.contact is not None
     return partial_derivative(trace, trace.contact, j)
 
 
 def release_shift(trace: Trace) -> list[Expr]:
-    """dt of a release from rest, where the contact acceleration b(t, c) of the side passes through 0: -b_c / b_t.
+    """The shift dt = -b_c / b_t of a release from rest, where the contact acceleration b(t, c) of the side passes through 0.
 
-    Under constant loads there is none.
+    Under constant loads, where b does not depend on t, it is nan.
     """
     pull = trace.contact_acceleration
     assert pull is not None
@@ -146,11 +148,11 @@ def release_shift(trace: Trace) -> list[Expr]:
 
 
 def rest_shift(trace: Trace) -> list[Expr]:
-    """dt of coming to rest at the end of an accumulation of impacts, from the state just after one of them on its side.
+    """The shift of the end of an accumulation of impacts, from the state just after one of them, on its side.
 
-    That impact moved by dt = (x_c - u) / v, and its speed by dv = z + a dt. The time left is
-    R = 2 w (1/abs(b_s) + e1/abs(b_n)) / (1 - e1 e2), as in `contact.accumulation`, so rest moves by
-    dt + R_v dv + R_t dt + R_c. The error is that of R, of the order of R^2.
+    The shift of that impact is dt = (x_c - u) / v, and that of its speed dv = z + a dt. The time left is
+    R = 2 w (1/abs(b_s) + e1/abs(b_n)) / (1 - e1 e2), as in `contact.accumulation`. The shift of the rest is therefore
+    dt + R_v dv + R_t dt + R_c, with the error of R, which is of the order of R^2.
     """
     v, left = Expr("velocity", (), 0), time_left(trace)
     acceleration = substitute(trace.acceleration[0], {Expr("coordinate", (), 0): trace.contact})
@@ -163,7 +165,7 @@ def rest_shift(trace: Trace) -> list[Expr]:
 
 
 def time_left(trace: Trace) -> Expr:
-    """R: what is left of an accumulation of impacts, from the velocity just after one of them on its side."""
+    """The time R that is left until an accumulation of impacts ends, from the velocity just after one of them, on its side."""
     pull, gap_rate, reset, turn = trace.contact_acceleration, trace.gap_rate, trace.velocity_after, trace.next_side
     assert pull is not None
     assert gap_rate is not None
@@ -179,18 +181,19 @@ def time_left(trace: Trace) -> Expr:
 
 
 def number_slopes(trace: Trace) -> list[Expr]:
-    """The derivatives of the numbers that events at contacts need along each column, one after the other."""
+    """The derivatives, along each column, of the numbers that events at contacts need; one column after the other."""
     return [derivative_along(trace, x, j) for j in range(trace.columns) for x in trace.contact_numbers]
 
 
 def reaction_slopes(trace: Trace, reaction: Expr) -> list[Expr]:
-    """The derivative of a reaction along each column at a fixed time; where the reaction reaches 0 it is -dt times its rate."""
+    """The derivative of a reaction along each column at a fixed time: -dt times the reaction's rate, where it reaches 0."""
     accelerations = {Expr("acceleration", (), i): a for i, a in enumerate(trace.acceleration[: trace.dof])}
     return [derivative_along(trace, substitute(reaction, accelerations), j) for j in range(trace.columns)]
 
 
 def margin_shift(trace: Trace, margin: Expr) -> list[Expr]:
-    """dt of a margin m(q, v, a, t, c) reaching 0: -(m_q u + m_v z + m_c) / (m_t + m_q v + m_v a), a being the model's own."""
+    """The shift of the instant at which a margin m(q, v, a, t, c) reaches 0: -(m_q u + m_v z + m_c) / (m_t + m_q v + m_v a),
+    where a is substituted by the model's acceleration."""
     a = trace.acceleration[: trace.dof]
     margin = substitute(margin, {Expr("acceleration", (), i): a[i] for i in range(trace.dof)})
     speed = time_derivative(trace, margin)

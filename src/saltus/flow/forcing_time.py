@@ -1,4 +1,4 @@
-"""Time as the flow counts it: the number of the forcing period and a time within it, so that the phase stays exact."""
+"""The flow's representation of time, the number of the forcing period and a time within it, by which the phase stays exact."""
 
 from __future__ import annotations
 
@@ -25,12 +25,14 @@ class Clock:
 
 
 def clock(time: Any, length: Any, periods: float | None, duration: float | None) -> Clock:
-    """When motions start and end that begin at `time`, under loads of period `length` (or None), and go on for so long.
+    """The start and the end of motions that begin at `time`, under loads of period `length` (or None), and last `periods` or
+    `duration`.
 
     Raises
     ------
     ParameterError
-        Both of periods and duration or neither, a negative one, periods without a period, too many to count.
+        Both of `periods` and `duration` are given, or neither; one is negative or too long to count; or `periods` is given
+        without a forcing period.
     """
     if (periods is None) == (duration is None):
         raise ParameterError("say how long: either periods=... or duration=...", "periods")

@@ -1,4 +1,4 @@
-"""The types of the functions that the flow of one motion compiles: the kernel's, and those of a structure that it calls."""
+"""The types of the compiled functions that follow one motion: those of the kernel, and those of a structure, which it calls."""
 
 from __future__ import annotations
 

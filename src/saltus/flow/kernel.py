@@ -1,13 +1,13 @@
-"""The robust scalar flow: arcs, impacts, rest and release, accumulations of impacts, chatter.
+"""The scalar flow of one motion: arcs, impacts, rest and release, accumulations of impacts, chatter.
 
-The compiled parts of `kernel_layout.py`, `roots.py`, `steps.py`, `contact.py`, `chatter.py` and this file are compiled as one,
-once for every model: the functions that are generated for a structure (see `compiled.py`) are arguments. So these files are plain
-loops under the decorators of `saltus.taylor`, and share one namespace.
+The compiled parts of `kernel_layout.py`, `roots.py`, `steps.py`, `contact.py`, `chatter.py` and this file are compiled as one
+module, once for all models: the functions that are generated for a structure (see `compiled.py`) are arguments. These files
+therefore consist of plain loops under the decorators of `saltus.taylor`, and share one namespace.
 
-A motion is in one of the modes of `Mode`. With a tangent (see `event_derivatives.py`) its columns are further coordinates, which
-`series` expands with the others. The steps are the motion's own, so its impacts are the same to the last bit, except where a
-column needs shorter ones. What an event makes of the columns, and how it moves, is the structure's function `tangent`; where it
-has none, it is nan.
+A motion is in one of the modes of `Mode`. If a tangent is asked for (see `event_derivatives.py`), its columns are further
+coordinates, which `series` expands with the others. The steps are chosen by the motion itself, so that its impacts are the same
+to the last bit with and without tangent, except where a column needs shorter steps. At an event the structure's function
+`tangent` computes the new columns and the shift of the event, which are nan where there is no derivative.
 
 `where`, `state` and `settings` are arrays in the places of `Where`, `State` and `Setting`; `env` = (parameters, constants, record
 breakpoints, record table); `model` holds the functions of the structure in the places of `ModelPart`, and `work` the arrays of a
@@ -71,7 +71,7 @@ def arc_step(where, settings, env, model, work, t, origin, target, size):
 
 @lean_jit
 def first_margin(where, m, order, h, poly, hit, first):
-    """The margin that reaches zero first within the step, and when, if that is before `first`; else `hit` and `first`."""
+    """The margin that reaches zero first within the step, and its instant, if this is before `first`; else `hit` and `first`."""
     for j in range(where[Where.MARGINS]):
         u = margin_root(m[j], order, h, poly)
         if u < first:
@@ -92,7 +92,7 @@ def arc(where, state, settings, env, model, work, steps, events, origin, target)
         kind, u, touch = contact_root(g, where[Where.SKIP], order, h, poly)
         if kind == SIMPLE:
             hit, first = where[Where.MARGINS], u
-        elif 0.75 < touch <= 1.0 and h == natural:  # keep a touch away from the end of a step, where it would be seen twice
+        elif 0.75 < touch <= 1.0 and h == natural:  # a touch near the end of a step could be found again in the next one
             h, touch = 0.5 * h, NEVER
     hit, first = first_margin(where, m, order, h, poly, hit, first)
     if touch < first and touch <= 1.0:
@@ -120,7 +120,8 @@ def arc(where, state, settings, env, model, work, steps, events, origin, target)
 
 @lean_jit
 def first_release(where, b, order, h, poly):
-    """When in the step a contact acceleration first points outward, as a share of it, and the side; now if it does already."""
+    """The first instant at which a contact acceleration points outward, as a share of the step, and its side; 0 and 0 if one does
+    already at the start."""
     first, released = NEVER, 0
     for i in range(where[Where.SIDES]):
         skip = leading(b[i], 0, order)
@@ -160,7 +161,7 @@ def held(where, state, settings, env, model, work, steps, origin, target):
             state[State.COORDINATES + where[Where.DOF]] = velocity
     else:
         where[Where.MODE], where[Where.SKIP] = Mode.CONTACT, released
-        state[State.TIME] = t + tau if t + tau > t or released == 0 else np.nextafter(t, np.inf)  # time must go on
+        state[State.TIME] = t + tau if t + tau > t or released == 0 else np.nextafter(t, np.inf)  # time must increase
 
 
 @lean_jit

@@ -31,7 +31,7 @@ class KernelState:
         Raises
         ------
         ParameterError
-            A state beyond the contact, a gap or a reset that cannot be.
+            The state lies beyond the contact, or the model's gap or reset is impossible.
         """
         where, at = np.zeros(len(Where), dtype=np.int64), request.clock
         where[Where.PERIOD], where[Where.LAST_PERIOD] = int(at.first), int(at.last)
@@ -45,7 +45,7 @@ class KernelState:
         return cls(where, state, np.array([at.length, at.end, request.tol]))
 
     def advance(self, run: Program, steps: Any, events: Any) -> int:
-        """Call the kernel; returns why it comes back."""
+        """Call the kernel; returns the `Status` with which it stops."""
         return load_kernel()(self.where, self.state, self.settings, run.env, run.model, steps, events)
 
     @property
@@ -55,7 +55,7 @@ class KernelState:
 
     @property
     def end_time(self) -> float:
-        """The time at which the motion ends if nothing ends it before."""
+        """The time at which the motion ends, unless something ends it earlier."""
         return float(self.where[Where.LAST_PERIOD] * self.settings[Setting.LENGTH] + self.settings[Setting.END])
 
     @property
@@ -76,7 +76,7 @@ class KernelState:
 
     @property
     def columns(self) -> np.ndarray:
-        """The tangent's columns, (2 own coordinates, columns): of the coordinates, then of the velocities."""
+        """The tangent's columns, (2 own coordinates, columns): the rows of the coordinates, then those of the velocities."""
         own, shape = self.where[Where.OWN], (2, 1 + self.where[Where.COLUMNS], self.where[Where.OWN])
         both = self.state[State.COORDINATES : State.COORDINATES + 2 * self.where[Where.DOF]].reshape(shape)
         columns: np.ndarray = both[:, 1:].transpose(0, 2, 1).reshape(2 * own, -1)
@@ -100,6 +100,6 @@ def _mode_and_side(request: MotionRequest, run: Program) -> tuple[int, int]:
 def _first_state(run: Program, position: np.ndarray, speeds: np.ndarray) -> np.ndarray:
     """Local time, chatter speed, coordinates and velocities, each followed by the tangent's columns, and the shifts."""
     columns = run.structure.sizes[-1]
-    start = np.eye(columns, 2 * position.size)  # in row j what column j begins with
+    start = np.eye(columns, 2 * position.size)  # row j is the initial value of column j
     u, z = start[:, : position.size].ravel(), start[:, position.size :].ravel()
     return np.concatenate([[0.0, 0.0], position, u, speeds, z, np.zeros(columns)])

@@ -1,4 +1,4 @@
-"""When a periodic load pulls a system at rest off its contact: what alone fixes how a motion goes on after rest."""
+"""The instants at which a periodic load pulls a resting system off its contact; they alone determine the motion after rest."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ RELEASE_SAMPLES = 64  # per forcing period and order of the highest harmonic: th
 
 @dataclass(frozen=True)
 class Release:
-    """A root of a contact acceleration at which it begins to pull: from then on rest cannot be kept.
+    """A release: a root of a contact acceleration, from which on it pulls, so that rest ends.
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class Release:
     side
         The side on which the gap then opens; with several contacts the number of the contact, from 1 on.
     peak
-        The greatest pull before it presses again: 0 where the release is only touched, and lost.
+        The largest pull before the acceleration presses again; where it is 0 the release is lost.
 
     Examples
     --------
@@ -41,10 +41,10 @@ class Release:
 
 
 def contact_pull(system: System, side: int) -> Callable[[Any], Any]:
-    """The second derivative of the gap of a system at rest at contact on a side, as a function of time: a_s of numerics 1.
+    """The second derivative of the gap of a system at rest at the contact, on a side, as a function of time.
 
-    Rest presses there while it is negative. With several contacts `side` is the number of one, from 1 on, and it is the force
-    along its sign with all of them closed.
+    The system stays at rest while it is negative on all sides. With several contacts `side` is the number of a contact, from 1
+    on, and the function is the force along the contact's sign with all contacts closed.
     """
     model, load = system.model, system.load
     if model.contacts:
@@ -66,10 +66,11 @@ def _force_at_rest(model: Model, t: Any, position: list[float], load: Load) -> l
 
 @answered
 def load_releases(system: System) -> tuple[Release, ...]:
-    """The releases of one forcing period, by their time; none for a load that always presses, always pulls or has no period.
+    """The releases of one forcing period, in the order of time; none for a load that always presses, always pulls or has no
+    period.
 
-    For load (i) of the metainterface with equal layers those of side +1 are at sin(Omega t) = Hcr / Hhat, with
-    Hcr = abs(V / tan(beta0)), and those of side -1 half a period later.
+    For load (i) of the metainterface with equal layers, the releases to side +1 are at sin(Omega t) = Hcr / Hhat, with
+    Hcr = abs(V / tan(beta0)), and those to side -1 half a period later.
 
     Parameters
     ----------
@@ -91,7 +92,7 @@ def load_releases(system: System) -> tuple[Release, ...]:
 
 
 def peak_near(system: System, side: int, phase: float) -> float:
-    """The peak of the contact acceleration on a side that follows nearest after a phase of the load, even if it does not pull."""
+    """The first peak of the contact acceleration on a side after a phase of the load, even if it does not pull there."""
     period = system.load.period
     assert period is not None
     peaks = _peaks(system, side)
@@ -108,7 +109,7 @@ def _grid(system: System) -> np.ndarray:
 
 
 def _peaks(system: System, side: int) -> list[tuple[float, float]]:
-    """Where the contact acceleration on a side has its maxima, and how large they are."""
+    """The maxima of the contact acceleration on a side: their times and values."""
     from scipy.optimize import minimize_scalar
 
     pull, times = contact_pull(system, side), _grid(system)
@@ -123,7 +124,7 @@ def _peaks(system: System, side: int) -> list[tuple[float, float]]:
 
 
 def _of_side(system: System, side: int) -> list[Release]:
-    """The rising roots before the peaks that pull, each once, with the largest of its peaks."""
+    """The releases to a side: the rising roots before peaks that pull, each once, with the largest of its peaks."""
     from scipy.optimize import brentq
 
     pull, period, times = contact_pull(system, side), system.load.period, _grid(system)

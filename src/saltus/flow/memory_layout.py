@@ -1,4 +1,4 @@
-"""What the generated functions and their callers agree on: numbers of events, places in a state, slots of the lanes' memory.
+"""Definitions that the generated functions share with their callers: numbers of events, places in a state, slots of memory.
 
 The enumerations are written into compiled code as the numbers that they stand for (see `compiled_part`).
 """
@@ -9,7 +9,7 @@ from enum import IntEnum
 
 
 class EventCode(IntEnum):
-    """What happens at an instant of a motion; for the generated function `tangent` also what it is asked."""
+    """The kinds of events of a motion; the generated function `tangent` takes them as an argument."""
 
     IMPACT = 0
     GRAZING = 1
@@ -21,19 +21,19 @@ class EventCode(IntEnum):
     STICK = 7
     SLIP = 8
     REVERSAL = 9
-    RESET_SLOPES = 10  # no event: the derivatives of the reset alone, at a fixed instant of impact
+    RESET_SLOPES = 10  # no event, but a request to `tangent`: the derivatives of the reset alone, at a fixed instant
 
 
 class RestDetail(IntEnum):
-    """How rest comes about, which decides its derivatives."""
+    """The way in which a system comes to rest, which decides the derivatives at rest."""
 
     AFTER_IMPACTS = 0  # as the limit of an accumulation of impacts
-    AT_ONCE = 1  # after an impact that leaves no speed, and motions from states beside it come to rest soon after
-    NEVER_AGAIN = 2  # at once, but impacts lose nothing, so that motions from states beside it never come to rest
+    AT_ONCE = 1  # after an impact that leaves no speed; motions from neighbouring states come to rest soon after
+    NEVER_AGAIN = 2  # at once, but impacts lose nothing, so that motions from neighbouring states never come to rest
 
 
 class ReleaseDetail(IntEnum):
-    """What releases a system from rest, which decides the derivatives of the release."""
+    """The cause of a release from rest, which decides the derivatives of the release."""
 
     AT_A_ROOT = 0  # a simple root of the contact acceleration
     AT_A_JUMP = 1  # a jump of the contact acceleration through zero, whose time the load fixes
@@ -43,8 +43,8 @@ class ReleaseDetail(IntEnum):
 class State(IntEnum):
     """Places in the array `state` of the scalar kernel.
 
-    From COORDINATES on it holds all coordinates, those of the tangent's columns included, then their velocities, then for each
-    column by how much the last event moves.
+    From COORDINATES on it holds all coordinates, including those of the tangent's columns, then their velocities, then for each
+    column the shift of the last event.
     """
 
     TIME = 0  # within the forcing period
@@ -56,11 +56,11 @@ class LaneSlot(IntEnum):
     """The slots of the lanes' memory that the generated functions read or write besides the parts of `LanePart`."""
 
     NOW = 0  # time within the forcing period
-    ORIGIN = 1  # time at which that began
+    ORIGIN = 1  # time at which the forcing period began
     SIDE = 2
-    NEW_TIME = 3  # of what a step proposes
+    NEW_TIME = 3  # the time at the end of the step
     NEW_SIDE = 4  # after an impact
-    FREE_POSITION = 32  # of the one coordinate that is free, in a model with several contacts
+    FREE_POSITION = 32  # with several contacts, where only one coordinate is free: this coordinate
     FREE_VELOCITY = 33
 
 
@@ -69,16 +69,16 @@ class LanePart(IntEnum):
 
     POSITION = 0
     VELOCITY = 1
-    NEW_POSITION = 2  # at the end of the step that is proposed
+    NEW_POSITION = 2  # at the end of the step
     NEW_VELOCITY = 3
-    AFTER_POSITION = 4  # after an impact there
+    AFTER_POSITION = 4  # after an impact at the end of the step
     AFTER_VELOCITY = 5
     ENDED_POSITION = 6  # at the end of the last forcing period
     ENDED_VELOCITY = 7
     PARAMETERS = 8
-    FREE = 9  # 1 for each coordinate that no contact holds, else 0, of a model with several
-    CONTACTS = 10  # their positions
-    MASS = 11  # matrix at the new state, by rows
+    FREE = 9  # with several contacts: 1 for each coordinate that no contact holds, else 0
+    CONTACTS = 10  # the contacts' positions
+    MASS = 11  # the mass matrix at the new state, by rows
     RESTITUTION = 12  # E by rows
     IMPULSES = 13  # room for the impulses of an impact
     CONSTANT_GUARDS = 14  # margins that do not change while one coordinate is free

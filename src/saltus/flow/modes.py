@@ -1,4 +1,4 @@
-"""What the number `side` says of motions of models with contacts or frictions."""
+"""The modes of models with contacts or frictions, which are encoded in the number `side` of a motion."""
 
 from __future__ import annotations
 

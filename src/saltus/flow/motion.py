@@ -1,4 +1,4 @@
-"""What a simulation returns: the end state, the events, the dense output, and whether the mechanism could move so."""
+"""The result of a simulation: the end state, the events, the dense output, and the validity of the motion."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ class EventKind(StrEnum):
     IMPACT = "impact"  #: an impact: the gap closes with a speed
     GRAZING = "grazing"  #: the gap touches zero without a speed, to within the working precision
     REST = "rest"  #: the system comes to rest at contact, at once or as the limit of impacts
-    RELEASE = "release"  #: it leaves contact from rest
+    RELEASE = "release"  #: the system leaves contact from rest
     CHATTER = "chatter"  #: impacts without loss became too small to follow; the phase is lost from here on
     LIMIT = "limit"  #: a margin reached zero
     HELD = "held"  #: of several contacts, some come to rest as the limit of impacts
-    STICK = "stick"  #: what slid with dry friction sticks
-    SLIP = "slip"  #: what stuck begins to slide
-    REVERSAL = "reversal"  #: it slides the other way without having stuck
+    STICK = "stick"  #: a friction changes from sliding to sticking
+    SLIP = "slip"  #: a friction changes from sticking to sliding
+    REVERSAL = "reversal"  #: a friction slides the other way without having stuck
 
 
 EVENT_KINDS = tuple(EventKind)  # by the kernel's numbers
@@ -61,11 +61,11 @@ class Event:
     kind
         What happened.
     side
-        The side that it ends.
+        The side on which the motion was before it.
     velocity_before
-        The rate of the coordinate just before.
+        The velocity just before it.
     velocity_after
-        That just after.
+        The velocity just after it.
 
     Examples
     --------
@@ -88,13 +88,13 @@ class Impacts:
     Attributes
     ----------
     time
-        (n,) dimensionless times.
+        The dimensionless times, (n,).
     side
-        (n,) the side that each ends.
+        The sides before the impacts, (n,).
     velocity_before
-        (n,) the rate of the coordinate just before each.
+        The velocities just before the impacts, (n,).
     velocity_after
-        (n,) that just after.
+        The velocities just after the impacts, (n,).
 
     Examples
     --------
@@ -152,7 +152,7 @@ class MotionEvents(Sequence[Event]):
 
     @property
     def details(self) -> np.ndarray:
-        """What the kernel noted with each event, see `memory_layout.py`; of a limit, which margin it is."""
+        """The detail that the kernel recorded with each event, see `memory_layout.py`; for a limit the number of the margin."""
         return self._labels[:, 3]
 
     def impacts(self) -> Impacts:
@@ -177,8 +177,8 @@ class Samples:
 class Motion(Result):
     """An exact motion of a system.
 
-    The coordinate at the end has the model's own name: `motion.theta`, or `motion.x` for a wall oscillator; all of them are in
-    `motion.position`. With several degrees of freedom positions and velocities are tuples.
+    The coordinate at the end has the model's own name: `motion.theta`, or `motion.x` for a wall oscillator. `motion.position` has
+    all coordinates. With several degrees of freedom positions and velocities are tuples.
 
     Attributes
     ----------
@@ -193,16 +193,16 @@ class Motion(Result):
     position
         The coordinate at the end; a tuple where there are several.
     velocity
-        Its rate at the end, of the same kind.
+        The velocity at the end; a tuple where there are several coordinates.
     side
-        The side at the end: +1 or -1, and 0 at rest; of a model with contacts or frictions 1 and what `closed` and
-        `sliding` read from it.
+        The side at the end: +1 or -1, and 0 at rest; for a model with contacts or frictions a number that encodes `closed` and
+        `sliding`.
     stop
         Why it ended.
     limit
         The margin that stopped it.
     chatter_speed
-        The rate of the gap just after impacts on `side`, if it ends in chatter; theta and theta' are then 0.
+        If the motion ends in chatter, the rate of the gap just after impacts on `side`; the state is then given as at rest.
     periods
         The whole forcing periods since time 0.
     events
@@ -214,7 +214,7 @@ class Motion(Result):
     kept
         The states at the times that `simulate(times=...)` was given.
     sampled_validity
-        What its margins said, of a motion with `kept` samples.
+        The validity of a motion with `kept` samples.
 
     Examples
     --------
@@ -289,7 +289,7 @@ class Motion(Result):
         return len(self.events.of(EventKind.CHATTER)) == 0
 
     def at(self, times: Numbers) -> tuple[Any, Any]:
-        """Coordinate and velocity at any times of the motion, at the method's accuracy; after the impact at an impact.
+        """Coordinate and velocity at any times of the motion, at the method's accuracy; at an impact, the values after it.
 
         Parameters
         ----------
@@ -304,7 +304,7 @@ class Motion(Result):
         Raises
         ------
         ParameterError
-            A time outside the motion, or a motion computed with dense=False.
+            A time lies outside the motion, or the motion was computed with dense=False.
         """
         position, velocity, _ = self._states(instants(times))
         if len(self.system.model.coordinates) == 1:
@@ -333,12 +333,12 @@ class Motion(Result):
 
     @cached_property
     def validity(self) -> Validity:
-        """Whether the mechanism could move so: limits passed, and the share of time with a wrong reaction (errata 20, 21).
+        """The margins of the model that the motion passes, and for what share of the time (errata 20, 21).
 
         Raises
         ------
         ParameterError
-            A motion computed with dense=False and without samples.
+            The motion was computed with dense=False and without samples.
         """
         found = self.sampled_validity
         if found is None:
@@ -353,17 +353,17 @@ class Motion(Result):
         return replace(found, first=found.first | {self.limit: self.time})  # it ended at the very instant
 
     def samples(self, count: int) -> Samples:
-        """So many states, evenly over the motion, its start and its end among them.
+        """States at evenly spaced times over the motion, its start and its end included.
 
         Parameters
         ----------
         count
-            How many, from 2 on.
+            The number of states, at least 2.
 
         Raises
         ------
         ParameterError
-            Fewer than 2; a motion computed with dense=False.
+            `count` is less than 2, or the motion was computed with dense=False.
         """
         check_count("count", count, 2)
         times = np.linspace(self.start, self.time, int(count))
@@ -386,7 +386,8 @@ class Motion(Result):
         return html_table(f"Motion of {type(self.system.model).__name__}", facts | ({"margin": self.limit} if self.limit else {}))
 
     def to_xarray(self, times: Numbers | None = None) -> xarray.Dataset:
-        """The motion as a dataset with units and provenance; by default its samples, or 200 a forcing period, or 2000 in all.
+        """The motion as a dataset with units and provenance; by default at the times of its samples, else at 200 times in a
+        forcing period, or 2000 in all without a forcing.
 
         Parameters
         ----------

@@ -15,11 +15,12 @@ if TYPE_CHECKING:
 
     from saltus.flow.motion import Motion
 
-PERIOD_SAMPLES = 200  # samples of a forcing period where no times are given
+PERIOD_SAMPLES = 200  # samples in a forcing period if no times are given
 
 
 def to_dataset(motion: Motion, times: Any = None) -> xarray.Dataset:
-    """The sampled states over `time`, the impacts over `impact`, and in the attributes all that repeats the motion."""
+    """The sampled states over `time` and the impacts over `impact`; the attributes hold all that is needed to repeat the
+    motion."""
     import xarray
 
     period = motion.system.load.period
@@ -55,7 +56,7 @@ def to_dataset(motion: Motion, times: Any = None) -> xarray.Dataset:
 
 
 def _add_contacts(motion: Motion, dataset: xarray.Dataset, side: np.ndarray) -> None:
-    """Which contacts are closed and what slides, and the impacts: times, contacts, positions, velocities and impulses."""
+    """Add the closed contacts, the directions of frictions, and the impacts: times, contacts, positions and velocities."""
     model, impacts = motion.system.model, motion.impacts
     names, contacts = model.coordinates, [contact.name for contact in model.contacts]
     masks = np.array([1 << i for i in range(len(contacts))], dtype=np.int16)

@@ -1,4 +1,4 @@
-"""What is kept of a motion while it is computed: all of it, the states at given times, or its events alone."""
+"""The records of a motion while it is computed: all of its steps, the states at given times, or its events alone."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ class RecorderSettings:
 
     steps: int = 10_000_000  # The largest number of steps of a motion that is kept whole; they take about 2 GB.
     events: int = 20_000_000  # The largest number of events that are kept.
-    rate: int = 1_000_000  # The most impacts in a unit of time: more are an accumulation that is not being resolved.
-    burst: int = 20_000  # The impacts at several contacts over which that rate is looked for: each takes a pass of the kernel.
+    rate: int = 1_000_000  # The most impacts in a unit of time: more are an accumulation that is not resolved.
+    burst: int = 20_000  # With several contacts, impacts between two checks of their rate: each takes a pass of the kernel.
     buffer: int = 4096  # The steps, and events, that one call of the kernel may record.
 
 
@@ -31,10 +31,10 @@ MOST = RecorderSettings()
 
 
 class Recorder:
-    """Takes the kernel's buffers whenever they are full.
+    """Takes the contents of the kernel's buffers whenever these are full.
 
-    With `sample_times` the dense output of each buffer is sampled, checked for validity and dropped, so that memory is
-    bounded by the samples and the events.
+    With `sample_times` the dense output of each buffer is sampled, checked for validity and dropped, so that memory holds only
+    the samples and the events.
     """
 
     def __init__(self, request: MotionRequest, order: int, columns: int) -> None:
@@ -92,7 +92,7 @@ class Recorder:
         return [i for i in range(len(self._contacts)) if bits >> i & 1]
 
     def all_events(self) -> MotionEvents:
-        """Everything that happened."""
+        """All events of the motion."""
         labels, values = (np.concatenate([chunk[i] for chunk in self._events]) for i in (0, 1))
         times, values = labels[:, 0] * self._length + values[:, 0], values[:, : self._width]
         if self._several:
@@ -100,18 +100,18 @@ class Recorder:
         return MotionEvents(times, labels, values)
 
     def event_shifts(self) -> np.ndarray:
-        """How the time of each event moves with each column of the tangent, (events, columns); nan where that is not known."""
+        """The shift of each event along each column of the tangent, (events, columns); nan where it is not known."""
         return np.concatenate([values[:, self._width :] for _, values in self._events])
 
     def dense(self) -> DenseOutput | None:
-        """The whole dense output, or None where it was not kept."""
+        """The whole dense output, or None if it was not kept."""
         if self._times is not None or not self._pieces:
             return None
         fields = ("start", "length", "side", "series")
         return DenseOutput(*(np.concatenate([getattr(piece, name) for piece in self._pieces]) for name in fields))
 
     def samples(self, end: float, position: np.ndarray, velocity: np.ndarray, side: int) -> Samples | None:
-        """The states at the sample times up to the end, where the motion is as given; None where none were asked for."""
+        """The states at the sample times up to the end, for which the given state is used; None if no samples were asked for."""
         if self._times is None:
             return None
         stop = int(np.searchsorted(self._times, end + 1e-15 * abs(end), side="right"))
@@ -126,5 +126,5 @@ class Recorder:
         return samples
 
     def validity(self, duration: float) -> Validity:
-        """The verdict on what was sampled and dropped."""
+        """The validity of the motion, from the steps that were sampled and dropped."""
         return self._check.result(duration)

@@ -1,7 +1,7 @@
-"""Recurrence: following many motions until each rests, repeats itself or the time is up.
+"""Recurrence: many motions are followed until each rests, repeats itself or the time is up.
 
-This is the one engine with which orbits, attractors, charts and diagrams ask where motions go. A motion recurs with the period q
-when its stroboscopic states, those at phase 0 of the load, come back to themselves after q forcing periods.
+Orbits, attractors, charts and diagrams all use this one engine to find where motions end. A motion recurs with the period q if
+its stroboscopic states, those at phase 0 of the load, come back to themselves after q forcing periods.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RecurrenceSettings:
-    """The numbers by which a motion repeats itself, in orbits, attractors, charts and diagrams."""
+    """When a motion counts as periodic, in orbits, attractors, charts and diagrams."""
 
-    # The compiled lanes look for periods up to this one (`LONGEST_RECURRENCE` in flow/ensemble/sampling.py): a motion has settled
-    # on q periods when 2 q + 2 successive states agree with those q periods before to within `RECURRENT` there, 1e-10 of their
-    # size, or of 1 where they are smaller.
+    # The compiled lanes look for periods up to this one (`LONGEST_RECURRENCE` in flow/ensemble/sampling.py). A motion has settled
+    # with the period q if 2 q + 2 successive states agree with those q forcing periods before to within `RECURRENT` (same file):
+    # 1e-10 of their size, or of 1 where they are smaller.
     compiled_max_period: int = 16
-    # Longer periods are looked for in the states that were kept of a motion that was followed to the end: a round of them must
-    # agree with the round before to within this, which is looser as there is no streak of further rounds to look at.
+    # Longer periods are looked for in the last states of a motion that was followed to the end: the states of one period must
+    # agree with those of the period before to within this. It is larger because only two periods are compared.
     long_agreement: float = 1e-9
-    # A motion that is followed to the end repeats itself if its last state is this near to the one a period before: Newton's
-    # method then solves for the orbit, and refuses what was none.
+    # A motion that was followed to the end counts as periodic if its last state is this near to the one a period before: Newton's
+    # method then solves for the orbit, and fails if there is none.
     near_return: float = 1e-6
-    # The error of one step, relative to the state: a tenth of what the compiled lanes ask of two states that are the same.
+    # The error of one step, relative to the state: a tenth of the tolerance with which the compiled lanes compare states.
     tol: float = 1e-11
 
 
@@ -50,7 +50,7 @@ RECURRENCE = RecurrenceSettings()
 
 
 class Outcome(NumberedSentence):
-    """How a motion ends that was followed for some forcing periods."""
+    """The outcome of a motion that was followed for some forcing periods."""
 
     MOVING = 0, "it goes on moving without repeating itself"
     HELD = 1, "it is at rest at the contact, from where a later load may pull it"
@@ -61,11 +61,11 @@ class Outcome(NumberedSentence):
 
 @dataclass(frozen=True, eq=False)
 class Recurrence:
-    """How many motions end, a row for each; a state is the coordinates, then their velocities, d numbers in all."""
+    """The outcomes of many motions, one row for each; a state has the coordinates, then their velocities, d numbers in all."""
 
     outcome: np.ndarray  # (n,): an `Outcome` for each
-    period: np.ndarray  # (n,): forcing periods after which it repeats itself; 0 where it does not
-    periods: np.ndarray  # (n,): forcing periods that it was followed
+    period: np.ndarray  # (n,): forcing periods after which the motion repeats itself; 0 if it does not
+    periods: np.ndarray  # (n,): forcing periods for which it was followed
     last: np.ndarray  # (n, d): the state at the end
     states: np.ndarray  # (n, kept, d): the stroboscopic states, the last one last, nan where there were fewer
     # (n, kept, 2): largest and smallest of all coordinates in each of these periods; nan where they were not recorded
@@ -78,27 +78,27 @@ class Recurrence:
 
     @property
     def rest(self) -> np.ndarray:
-        """Which are at rest at the contact for good, (n,)."""
+        """Whether each motion is at rest at the contact for good, (n,)."""
         return np.asarray(self.outcome == Outcome.REST)
 
     @property
     def periodic(self) -> np.ndarray:
-        """Which repeat themselves, (n,)."""
+        """Whether each motion repeats itself, (n,)."""
         return np.asarray(self.outcome == Outcome.PERIODIC)
 
     @property
     def ended(self) -> np.ndarray:
-        """Which were ended by a margin of the model or cannot go on, (n,)."""
+        """Whether each motion was ended by a margin of the model, or cannot go on, (n,)."""
         return np.asarray(self.outcome == Outcome.ENDED)
 
     @property
     def unsettled(self) -> np.ndarray:
-        """Which neither rest for good, nor repeat themselves, nor have ended, (n,)."""
+        """Whether each motion neither rests for good, nor repeats itself, nor has ended, (n,)."""
         return np.asarray(self.outcome <= Outcome.HELD)
 
     @property
     def within_period(self) -> np.ndarray:
-        """Which of the kept forcing periods are the last `period` ones of a motion, (n, kept); all where it has no period."""
+        """Whether each kept forcing period is one of the motion's last `period` ones, (n, kept); all are if it has no period."""
         kept = max(a.shape[1] for a in (self.states, self.extrema, self.impact_counts, self.speeds) if a is not None)
         length = np.where(self.period > 0, self.period, kept)
         return np.asarray(np.arange(kept)[::-1] < length[:, None])
@@ -134,7 +134,7 @@ class Recurrence:
         return replace(self, **{name: values[rows] for name, values in columns.items() if values is not None})
 
     def after(self, periods: int, states: np.ndarray) -> Recurrence:
-        """These results as those of longer motions, which were followed before for `periods`, with these states, (n, kept, d)."""
+        """These results as those of longer motions, which were followed for `periods` before and then had these states."""
         return replace(self, periods=self.periods + periods, states=np.concatenate([states, self.states], axis=1))
 
 
@@ -159,32 +159,33 @@ def find_recurrence(
 ) -> Recurrence:
     """Follow motions from states at phase 0 until they rest for good, repeat themselves or the time is up.
 
-    A motion at the contact is at rest for good if it is proved to be captured, or if the load never pulls there; with parameters
-    of its own, only if it is proved.
+    A motion at the contact is at rest for good if it is proved to be captured, or if the load never pulls there. If motions have
+    parameters of their own, only the proof counts.
 
     Parameters
     ----------
     system
         What moves, under a load with a frequency.
     states
-        (n, d): coordinates, then velocities.
+        The states at the start, (n, d): coordinates, then velocities.
     periods
-        For how many forcing periods at most.
+        The largest number of forcing periods for which a motion is followed.
     parameters
         Numbers by dotted path, (n,) each, in place of the system's.
     captured
-        The speeds below which the motions are proved to be captured, (n,), where that is known (`captured_between`); else nan.
+        The speeds below which the motions are proved to be captured, (n,), if they are known (`captured_between`); else nan.
     max_period
-        The longest period looked for. Those above 16 need `kept` to be more than twice as many.
+        The longest period that is looked for. Periods above 16 are found only if `kept` is more than twice as large.
     kept
         How many of the last stroboscopic states are kept, by default all; 0 for none.
     extrema, impact_count, speed
         Whether these are recorded, over max(kept, max_period) of the last forcing periods.
     from_start
-        Whether extrema are recorded from the start, as they are where a limit of the model may end a motion. Otherwise they are
-        where it begins to repeat itself or its time is almost up, and nan for motions that come to rest for good or cannot go on.
+        Whether extrema are recorded from the start; they always are if a limit of the model may end a motion. Otherwise recording
+        begins when a motion begins to repeat itself or its time is nearly up, and extrema are nan for motions that come to rest
+        for good or cannot go on.
     stop_early
-        False follows every motion for all periods, and reads its period off the last states (`near_return`).
+        With False every motion is followed for all periods, and its period is read from the last states (`near_return`).
     tol
         The error that one step may make.
     threads
@@ -232,14 +233,15 @@ def last_states(system: System, result: xarray.Dataset) -> np.ndarray:
 
 
 def return_distances(states: np.ndarray, max_period: int) -> np.ndarray:
-    """How far the last of states (..., kept, d) is from those q = 1, 2, ... periods before, (..., max_period or fewer)."""
+    """The distance of the last of the states (..., kept, d) from those q = 1, 2, ... periods before, (..., max_period or
+    fewer)."""
     count = min(max_period, states.shape[-2] - 1)
     apart = np.abs(states[..., -1:, :] - states[..., -1 - count : -1, :]).max(axis=-1)
     return np.asarray(apart[..., ::-1])
 
 
 def return_period(states: np.ndarray, max_period: int, within: float = RECURRENCE.near_return) -> np.ndarray:
-    """The fewest periods after which the last of states (..., kept, d) has come back to within a distance; 0 if there is none."""
+    """The shortest period after which the last of the states (..., kept, d) has come back to within a distance; 0 if none has."""
     near = return_distances(states, max_period) < within
     if not near.shape[-1]:  # one state alone
         return np.zeros(near.shape[:-1], dtype=int)
@@ -247,12 +249,12 @@ def return_period(states: np.ndarray, max_period: int, within: float = RECURRENC
 
 
 def nearest_return(states: np.ndarray, max_period: int) -> int:
-    """The number of periods after which the last of states (kept, d) has come back nearest to where it was."""
+    """The period after which the last of the states (kept, d) is nearest to an earlier one."""
     return 1 + int(np.argmin(return_distances(states, max_period)))
 
 
 def _read(result: EnsembleResult) -> Recurrence:
-    """What was recorded of the motions, whose outcomes are not known yet."""
+    """The records of the motions; their outcomes are filled in later."""
     last, samples = result.last, result.samples
     assert result.periods is not None
     columns = {kind: samples[kind][:, :, 0] if kind in samples else None for kind in (Sample.IMPACT_COUNT, Sample.SPEED)}
@@ -280,7 +282,8 @@ def _outcome(result: EnsembleResult, varied: bool) -> np.ndarray:
 
 
 def _rest_lasts(system: System) -> bool:
-    """Whether the load never pulls where everything is at rest; of several contacts each must hold one coordinate."""
+    """Whether it is known that the load never pulls a system off its rest; with several contacts, each must hold one
+    coordinate."""
     contacts, names = system.model.contacts, system.model.coordinates
     known = not contacts or sorted(contact.coordinate for contact in contacts) == sorted(names)
     known &= not system.model.frictions
@@ -303,7 +306,7 @@ def _with_periods(found: Recurrence, compiled: Any, max_period: int, settings: R
 
 
 def _long_period(states: np.ndarray, max_period: int, settings: RecurrenceSettings) -> int:
-    """The period, longer than the compiled lanes look for, with which the last states (kept, d) repeat; 0 if there is none."""
+    """The period, longer than those that compiled lanes look for, with which the last states (kept, d) repeat; 0 without one."""
     for q in range(settings.compiled_max_period + 1, min(max_period, len(states) // 2 - 1) + 1):
         if np.abs(states[-q:] - states[-2 * q : -q]).max() < settings.long_agreement:
             return q

@@ -1,10 +1,10 @@
-"""What a contact does to the motion that passes it, and so what a grazing is: decided on the traced expressions.
+"""The regularity of a contact, which decides what a grazing is; it is determined from the traced expressions.
 
-Beside a grazing the return map of the states has a term in the depth d by which a motion goes through the contact. It is a square
-root of d where the velocity changes at an impact, or the acceleration as the contact is passed without speed, and of the order
-d^(3/2), so that the derivative is continuous, where neither does (di Bernardo, Budd and Champneys, Physica D 160 (2001) 222-254).
-A jump of the acceleration that is proportional to the velocity, as by a damper that begins at the contact, leaves it at d^(3/2):
-what it adds to the velocity on the way in it takes away on the way out, as the integral of x' over the excursion is 0.
+Beside a grazing the return map has a term in the depth d by which a motion goes beyond the contact. This term is a square root of
+d if the velocity changes at an impact, or if the acceleration at zero speed jumps at the contact. If neither does, it is of the
+order d^(3/2), and the map's derivative is continuous (di Bernardo, Budd and Champneys, Physica D 160 (2001) 222-254). A jump of
+the acceleration proportional to the velocity, as by a damper on one side, also leaves d^(3/2): its effects on the velocity on the
+way in and on the way out cancel, because the integral of x' over the excursion is 0.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from saltus.taylor import Expr, Form, NoNormalForm, Trace, constant, constant_va
 
 
 class ContactRegularity(Sentence):
-    """What passing the contact does to a motion.
+    """How a motion changes as it passes the contact.
 
     Examples
     --------
@@ -31,10 +31,11 @@ class ContactRegularity(Sentence):
 
 @lru_cache(maxsize=4096)
 def contact_regularity(traced: Trace, values: tuple[float, ...], free: tuple[str, ...] = ()) -> ContactRegularity:
-    """The regularity of a traced system's contact for the given numbers, whatever those at the paths `free` are.
+    """The regularity of a traced system's contact for the given numbers, and for any values of the parameters at the paths
+    `free`.
 
-    What is better than IMPACT is proved in exact arithmetic (`taylor/exact_algebra.py`); an identity for which no proof is found
-    counts as none. Without a contact it is CONTINUOUS.
+    JUMP and CONTINUOUS are proved in exact arithmetic (`taylor/exact_algebra.py`); if no proof is found, the result is IMPACT or
+    JUMP. Without a contact it is CONTINUOUS.
     """
     if traced.sides == 0:
         return ContactRegularity.CONTINUOUS
@@ -53,7 +54,7 @@ def contact_regularity(traced: Trace, values: tuple[float, ...], free: tuple[str
 
 
 def _passes(traced: Trace, leaves: dict[Expr, Form], side: int) -> bool:
-    """Whether an impact that ends a side leads to the other one with the velocity as it was, and the gap opens there."""
+    """Whether an impact on a side leads to the other side without a change of the velocity, and the gap opens there."""
     assert traced.velocity_after is not None
     assert traced.next_side is not None
     assert traced.gap_rate is not None

@@ -1,4 +1,4 @@
-"""What a single motion is asked for: the arguments that `simulate` and `sensitivities` share, read and checked once."""
+"""The request for a single motion: the arguments that `simulate` and `sensitivities` share, read and checked once."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ ARGUMENTS = ("velocity", "periods", "duration", "time")  # a misspelt one arrive
 
 @dataclass(frozen=True, kw_only=True)
 class MotionRequest:
-    """The arguments of `simulate`, as they are given.
+    """The arguments of `simulate` as they are given, and the quantities that follow from them.
 
     Raises
     ------
     ParameterError
-        An argument without meaning.
+        An argument has no meaning.
     """
 
     system: System
@@ -40,7 +40,7 @@ class MotionRequest:
     dense: bool
     times: Any = None
     sensitivities: tuple[str, ...] | None = None  # parameters to differentiate to; None without derivatives
-    # What follows from these:
+    # These follow from the arguments:
     position: np.ndarray = field(init=False)
     speeds: np.ndarray = field(init=False)
     limits: tuple[str, ...] = field(init=False)  # margins that end the motion
@@ -90,7 +90,7 @@ def _sample_times(given: Any, start: float) -> np.ndarray:
 
 
 def _one_by_one(coordinates: Mapping[str, Any], names: tuple[str, ...]) -> Mapping[str, Any]:
-    """The coordinates by their names, where they are given together: theta=(0.2, 0.0) for theta_1 and theta_2."""
+    """The coordinates by their names, also if they are given together: theta=(0.2, 0.0) for theta_1 and theta_2."""
     for together, values in coordinates.items():
         if together not in names and names == tuple(f"{together}_{i + 1}" for i in range(len(names))):
             if np.shape(values) != (len(names),):
@@ -100,12 +100,12 @@ def _one_by_one(coordinates: Mapping[str, Any], names: tuple[str, ...]) -> Mappi
 
 
 def check_coordinates(system: System, given: Iterable[str]) -> None:
-    """Refuse a start in other coordinates than those of the model, or without one of them.
+    """Refuse a start that has other coordinates than the model, or lacks one of them.
 
     Raises
     ------
     ParameterError
-        A name that is no coordinate, with the near ones; a coordinate that is not given.
+        A name is no coordinate (the message has similar names), or a coordinate is not given.
     """
     names, given = system.model.coordinates, tuple(given)
     for name in given:

@@ -13,10 +13,10 @@ from saltus.taylor import jit, lean_jit
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
 NONE, SIMPLE = 0, 1
-NEVER = 2.0  # later than any u in [0, 1]
+NEVER = 2.0  # stands for no root: later than any u in [0, 1]
 NARROW = 2.0**-26  # square root of the working precision: two roots closer than this are one tangency
 NOISE = 4.0 * 2.0**-52  # rounding of a Bernstein coefficient, relative to the sum of the polynomial's terms
-DEPTH = 64  # boxes that wait; a bisection to NARROW leaves one behind at each of 26 levels
+DEPTH = 64  # the most boxes on the stack; a bisection down to NARROW leaves one behind at each of 26 levels
 
 
 @jit
@@ -39,7 +39,7 @@ def horner_slope(c, n, x):
 
 @jit
 def excluded(p, n):
-    """Whether p > 0 on [0, 1] for certain: min(p0 + p1 u + p2 u^2) exceeds the sum of abs(p_k), k >= 3."""
+    """Whether certainly p > 0 on [0, 1], because min(p0 + p1 u + p2 u^2) exceeds the sum of abs(p_k), k >= 3."""
     rest = 0.0
     for k in range(3, n + 1):
         rest += abs(p[k])
@@ -63,7 +63,8 @@ def to_bernstein(p, n, b):
 
 @jit
 def variations(b, n):
-    """Sign variations of the coefficients (zeros left out): at most so many roots, and as many up to an even number."""
+    """The number of sign variations of the coefficients, zeros left out: the number of roots is this or less by an even
+    number."""
     count, last = 0, 0
     for i in range(n + 1):
         sign = 1 if b[i] > 0.0 else (-1 if b[i] < 0.0 else 0)
@@ -88,7 +89,7 @@ def newton(p, n, low, high):
     """The root of p in [low, high], p(low) > 0 >= p(high): Newton's steps, bisection where one leaves the bracket."""
     at_low, at_high = horner(p, n, low), horner(p, n, high)
     share = at_low / (at_low - at_high) if at_low > 0.0 > at_high else 0.5
-    if not 0.01 < share < 0.99:  # p may touch zero at an end, where rounding decides its sign: begin away from there
+    if not 0.01 < share < 0.99:  # p may be nearly zero at an end, where rounding decides its sign: begin in the middle
         share = 0.5
     u = low + share * (high - low)
     for _ in range(200):
@@ -99,7 +100,7 @@ def newton(p, n, low, high):
             high = u
         slope = horner_slope(p, n, u)
         following = u - value / slope if slope != 0.0 else 0.5 * (low + high)
-        if not low <= following <= high:  # equality is a converged step: refusing it costs nine digits
+        if not low <= following <= high:  # at equality the step has converged: bisection would lose nine digits
             following = 0.5 * (low + high)
         if abs(following - u) <= 2.0**-53 * following or high - low <= 2.0**-53 * high:
             return following
@@ -111,8 +112,8 @@ def newton(p, n, low, high):
 def first_root(p, n):
     """The first root in (0, 1] of a polynomial of degree n that starts positive.
 
-    Returns (kind, u, touch): SIMPLE and the root, or NONE; and the first place before it where p touches zero to within
-    the working precision without going through (a grazing), or NEVER.
+    Returns (kind, u, touch): SIMPLE and the root, or NONE; and the first place before it at which p touches zero, within the
+    working precision, without changing its sign (a grazing), or NEVER.
     """
     if excluded(p, n):
         return NONE, NEVER, NEVER
@@ -180,7 +181,7 @@ def scale_gap(g, skip, order, h, p):
 
 @jit
 def contact_root(g, skip, order, h, poly):
-    """The first zero of the gap within the step, its known zero of order `skip` at the start left out."""
+    """The first zero of the gap within the step, apart from a known zero of order `skip` at its start."""
     if skip == 0 and g[0] <= 0.0:  # rounding left the last step's end on the wrong side of the contact
         if g[1] < 0.0:
             return SIMPLE, 0.0, NEVER
@@ -193,7 +194,8 @@ def contact_root(g, skip, order, h, poly):
 
 @lean_jit
 def margin_root(m, order, h, poly):
-    """When a margin reaches zero within the step, as a share of it; 0 if it has, NEVER if it does not."""
+    """The instant at which a margin reaches zero within the step, as a share of it; 0 if it is not positive at the start, NEVER
+    if it does not reach zero."""
     if m[0] <= 0.0:
         return 0.0
     scale_gap(m, 0, order, h, poly)
@@ -212,7 +214,8 @@ def leading(coefficients, start, order):
 
 @jit
 def roots_within(p, n, roots, noise):
-    """The places in (0, 1) at which a polynomial of degree n goes through zero, except within `noise`; returns how many."""
+    """Fill `roots` with the places in (0, 1) at which a polynomial of degree n changes its sign by more than `noise`; returns
+    their number."""
     boxes = np.empty((DEPTH, n + 1))
     left, width = np.empty(DEPTH), np.empty(DEPTH)
     to_bernstein(p, n, boxes[0])

@@ -1,9 +1,10 @@
-"""Smooth segments with their derivatives: what the boundary-value problem of a periodic orbit is made of (see `orbits/`).
+"""Smooth segments with their derivatives: the parts of the boundary-value problem of a periodic orbit (see `orbits/`).
 
 A segment is the smooth motion on one side from one instant to another, whatever the sign of the gap, forwards or backwards in
-time, started by an impact or from a state; or, where passing the contact is no singularity (`ContactRegularity.CONTINUOUS`), the
-motion through all sides from a state. The compiled parts of the kernel's files (see `kernel.py`) up to `chatter.py` and of
-this file are compiled as one, once for every model. Phases are those of time 0, so records, which have none, are left out.
+time; it starts with an impact or from a state. If passing the contact is no singularity (`ContactRegularity.CONTINUOUS`), it is
+the motion from a state through all sides. The compiled parts of the kernel's files (see `kernel.py`) up to `chatter.py` and of
+this file are compiled as one module, once for all models. Time is not counted by forcing periods here; loads with records, which
+are not periodic, have no orbits.
 """
 
 from __future__ import annotations
@@ -24,19 +25,20 @@ from saltus.taylor import by_reference, cached_jit, jit, lean_jit
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
 SEGMENT_START, SEGMENT_END, APPROACH = 0, 1, 2  # in `spans`: times, and the gap's speed before the impact that starts it
-BEFORE, ALONG = 0, 1  # in `sides`: the side before that impact (0: from a state), and the side of the segment (0: all)
-QUOTIENT, RESET_DRIFT, KINDS = 0, 1, 2  # in `ends`: (x - contact) / duration, dv+/dt; x, v, a at the end and at the start
-HUMP, HUMP_TIME, TOP, BOTTOM = 0, 1, 2, 3  # in `extremes`: lowest inner minimum of the gap, when, range of x
-CROSSINGS, SHALLOWEST, DEEPEST = 4, 5, 6  # how often the contact is passed, the least depth of a side's arc, the last arc's depth
+BEFORE, ALONG = 0, 1  # in `sides`: the side before that impact (0: starts from a state), and the side of the segment (0: all)
+QUOTIENT, RESET_DRIFT, KINDS = 0, 1, 2  # in `ends`: (x - contact) / duration, dv+/dt; then x, v, a at the end and at the start
+HUMP, HUMP_TIME, TOP, BOTTOM = 0, 1, 2, 3  # in `extremes`: lowest inner minimum of the gap, its time, largest and least x
+CROSSINGS, SHALLOWEST, DEEPEST = 4, 5, 6  # number of passages of the contact, least depth of an arc, depth of the last arc
 LEAST_MARGIN = 7  # the margins' least values, from here on
-SLOWEST = 1e-9  # A slower passage has the tangent of this one: near a grazing two cancel, and 1e-16 / speed is their rounding.
+# A slower passage gets the tangent of one with this speed: near a grazing two passages cancel, with a rounding of 1e-16 / speed.
+SLOWEST = 1e-9
 MOST_STEPS = 100_000  # of one segment
 SHORT = 1e-6  # a segment's duration below which the derivatives of its quotient are those of its beginning
 
 
 @lean_jit
 def extremes_of_other(q, v, h, order, roots, poly, seen):
-    """Take in the range of a coordinate that has no contact."""
+    """Update the extremes with the range of a coordinate that has no contact."""
     scale_gap(v, 0, order, h, poly)
     size = 0.0
     for k in range(order + 1):
@@ -48,7 +50,7 @@ def extremes_of_other(q, v, h, order, roots, poly, seen):
 
 @lean_jit
 def extremes_in_step(where, model, work, side, t, h, order, roots, seen):
-    """Take in what a step of a segment shows: turning points of the coordinates, minima of the gap and of the margins."""
+    """Update the extremes with a step of a segment: extrema of the coordinates, minima of the gap and of the margins."""
     q, v, m, poly = work[Work.POSITIONS], work[Work.VELOCITIES], work[Work.MARGINS], work[Work.POLYNOMIAL]
     seen[TOP], seen[BOTTOM] = max(seen[TOP], q[0, 0]), min(seen[BOTTOM], q[0, 0])
     scale_gap(v[0], 0, order, h, poly)
@@ -92,7 +94,7 @@ def start_by_impact(where, state, env, model, work, t, side, speed):
     set_state(where, state, model[ModelPart.GEOMETRY][Geometry.CONTACT], after)
     drift = state[velocities + where[Where.DOF] + 1]
     expand(where, state, env, model, work, t, 0.0, next_side, 0)
-    state[coordinates + 2] = -state[velocities]  # the column of the start: what the equation of motion adds to it
+    state[coordinates + 2] = -state[velocities]  # the column of the start: the term of the equation of motion
     state[velocities + 2] = drift - work[Work.ACCELERATIONS][0, 0]
     return next_side, drift
 
@@ -111,7 +113,7 @@ def start_from_state(where, state, env, model, work, t, side, given):
 
 @lean_jit
 def segment_step(where, settings, env, model, work, t, end, side, size):
-    """The step, without its sign, that the series of a segment allow."""
+    """The absolute length of the step that the series of a segment allow."""
     q, v, a = work[Work.POSITIONS], work[Work.VELOCITIES], work[Work.ACCELERATIONS]
     order, tol = where[Where.ORDER], settings[Setting.TOLERANCE]
     natural = step_size(v[: where[Where.OWN]], order, size, tol)
@@ -125,7 +127,8 @@ def segment_step(where, settings, env, model, work, t, end, side, size):
 
 @lean_jit
 def follow(where, state, settings, env, model, work, begin, end, side, recording, roots, seen):
-    """Follow one segment. Returns the quotient (x - contact) / duration of its first coordinate, or nan where it fails."""
+    """Follow one segment. Returns the quotient (x - contact) / duration of its first coordinate, or nan if it cannot be
+    followed."""
     q, v = work[Work.POSITIONS], work[Work.VELOCITIES]
     order, t, forwards = where[Where.ORDER], begin, end >= begin
     quotient = math.nan
@@ -138,7 +141,7 @@ def follow(where, state, settings, env, model, work, begin, end, side, recording
         h = end - t if last else (natural if forwards else -natural)
         if recording and h > 0.0:
             extremes_in_step(where, model, work, side, t, h, order, roots, seen)
-        if count == 0 and last:  # without the cancellation of x - contact where the segment is short
+        if count == 0 and last:  # from the series itself, because x - contact loses digits in short segments
             quotient = horner(q[0, 1:], order - 1, h)
         move(where, state, q, v, h)
         if last:
@@ -152,7 +155,8 @@ def follow(where, state, settings, env, model, work, begin, end, side, recording
 
 @lean_jit
 def pass_contact(where, state, env, model, t, side):
-    """Pass the contact with the velocity that there is, the tangent too; returns the next side, or this one at a touch."""
+    """Pass through the contact with unchanged velocity, and transform the tangent; returns the next side, or at a touch this
+    one."""
     place, inward = State.COORDINATES + where[Where.DOF], -math.copysign(1.0, rate_of(model, side))
     velocity = state[place]
     if not inward * velocity > 0.0:
@@ -166,7 +170,8 @@ def pass_contact(where, state, env, model, t, side):
 
 @lean_jit
 def follow_through(where, state, settings, env, model, work, begin, end, side, recording, roots, seen):
-    """Follow one segment through all sides of a continuous contact. Returns the side at its end, or 0 where it fails."""
+    """Follow one segment through all sides of a continuous contact. Returns the side at its end, or 0 if it cannot be
+    followed."""
     order, t, skip, first = where[Where.ORDER], begin, 0, np.inf
     for _ in range(MOST_STEPS):
         size = expand(where, state, env, model, work, t, 0.0, side, order)
@@ -183,7 +188,7 @@ def follow_through(where, state, settings, env, model, work, begin, end, side, r
         if kind == SIMPLE:
             following = pass_contact(where, state, env, model, t, side)
             if recording and following != side:
-                if seen[CROSSINGS] == 0.0:  # the arc before the first passage goes on with that after the last one
+                if seen[CROSSINGS] == 0.0:  # on an orbit, the arc before the first passage continues the one after the last
                     first = seen[DEEPEST]
                 else:
                     seen[SHALLOWEST] = min(seen[SHALLOWEST], seen[DEEPEST])
@@ -248,12 +253,12 @@ def follow_segments_with(where, settings, env_of, model_of, arrays, spans, sides
 
 @cached_jit(SEGMENTS)
 def follow_segments(where, settings, env, model, spans, sides, states, ends, columns, extremes):
-    """Follow all segments; returns how many of them have succeeded.
+    """Follow all segments; returns how many could be followed.
 
-    A segment's columns are d/d(speed before its impact), d/d(its start) and the parameters, or, started from a state (its
-    coordinates and velocities in `states`), its derivatives to that state and to the parameters. They stand in `columns` at the
-    end (first the coordinates, then the velocities) and then at the start. With `extremes` empty nothing is recorded between.
-    From a state with the side 0 a segment goes through all sides.
+    The derivatives of a segment that starts with an impact are to the speed before this impact, to its time and to the
+    parameters; those of a segment that starts from a state (in `states`) are to this state and to the parameters. `columns` has
+    them for the end (first the coordinates, then the velocities), then for the start. `extremes` are recorded unless the array is
+    empty. A segment with the side 0 goes through all sides.
     """
     arrays = work_arrays(where)
     return follow_segments_with(where, settings, env, model, arrays, spans, sides, states, ends, columns, extremes)
@@ -263,8 +268,9 @@ def follow_segments(where, settings, env, model, spans, sides, states, ends, col
 def impact_equations(spans, signs, speeds, frequency, place, ends, columns, residual, here, there, parameters):
     """The equations of impacts, w / duration = 0 and -w' - v_next = 0 for each segment, and their derivatives.
 
-    `here` is to the phase and the speed of the impact before the segment, `there` of the one after it; `place` is the
-    parameter's that is the frequency, or -1. `signs` are those of the gap's rate on the segments, `speeds` of the next impacts.
+    `here` holds the derivatives to phase and speed of the impact before the segment, `there` to those of the impact after it.
+    `place` is the place of the frequency among the parameters, or -1. `signs` are the signs of the gap's rate on the segments,
+    and `speeds` the speeds of the impacts that end them.
     """
     for i in range(spans.shape[0]):
         begin, end, sign = spans[i, SEGMENT_START], spans[i, SEGMENT_END], signs[i]
@@ -282,6 +288,6 @@ def impact_equations(spans, signs, speeds, frequency, place, ends, columns, resi
         for j in range(2, column.shape[1]):
             by_value = column[3, j] if short else (column[0, j] - column[2, j]) / duration
             parameters[i, 0, j - 2], parameters[i, 1, j - 2] = sign * by_value, -sign * column[1, j]
-        if place >= 0:  # phases are kept as the frequency changes, not times
+        if place >= 0:  # derivatives to the frequency are at fixed phases, not at fixed times
             for row in range(2):
                 parameters[i, row, place] -= here[i, row, 0] * begin + there[i, row, 0] * end

@@ -45,32 +45,32 @@ IRREGULAR = {
 class Sensitivities(Result):
     """The derivatives of a motion of n degrees of freedom; a state is (coordinates, velocities), 2 n numbers.
 
-    They hold for the motion that `simulate` returns for the same arguments: from the same `time` on, whatever the load's phase
-    then is; at the end of a `duration`, at the end of so many `periods` even as the load's frequency changes them, or where a
-    margin ends it. A derivative is one-sided where the motion
-    starts at contact, is released by a jump of the load, ends on an event, or grazes the contact (see `grazings`).
+    They hold for the motion that `simulate` returns for the same arguments. Its start is at a fixed `time`. Its end is at a fixed
+    time if a `duration` was asked for; after a number of `periods` it moves with the load's frequency, and at a margin with the
+    margin. A derivative is one-sided if the motion starts at a contact, is released by a jump of the load, ends on an event, or
+    grazes the contact (see `grazings`).
 
     `event_times` has a row for each of `motion.events` and a column for each initial coordinate, initial velocity and
-    parameter: the derivative of its time. It is nan where the event has none (a grazing, the beginning of chatter, impacts or
-    releases of several contacts that come at several instants beside this motion) or where the motion had lost its derivative
-    before.
+    parameter: the derivatives of the event's time. They are nan if the event has none (a grazing, the beginning of chatter, or
+    impacts or releases of several contacts that are not simultaneous in neighbouring motions), and after the motion has lost its
+    derivative.
 
     Attributes
     ----------
     motion
         The motion.
     state
-        (2 n, 2 n): the derivatives of the state at the end to the one at the start.
+        The derivatives of the state at the end to the one at the start, (2 n, 2 n).
     parameters
-        (2 n, parameters): the derivatives of the state at the end to each parameter.
+        The derivatives of the state at the end to each parameter, (2 n, parameters).
     parameter_paths
         The dotted paths of the parameters.
     event_times
-        (events, 2 n + parameters): the derivatives of the events' times, as above.
+        The derivatives of the events' times, as above, (events, 2 n + parameters).
     grazings
-        The times at which the motion touches the contact; on the other side of a touch the derivative is another.
+        The times at which the motion touches the contact; motions that pass on the other side have other derivatives.
     undefined
-        Why the derivatives at the end, or some of them, do not exist; those are nan.
+        Why some or all derivatives at the end do not exist; these are nan.
 
     Examples
     --------
@@ -89,7 +89,7 @@ class Sensitivities(Result):
 
     @property
     def determinant(self) -> float:
-        """Of `state`: by what factor the flow has scaled volumes of states; 0 after rest, nan where `state` is."""
+        """The determinant of `state`, by which the flow has scaled volumes of states; 0 after rest, nan where `state` is nan."""
         return float(np.linalg.det(self.state)) if np.isfinite(self.state).all() else math.nan
 
     def to_xarray(self) -> xarray.Dataset:
@@ -130,13 +130,14 @@ def sensitivities(
 ) -> Sensitivities:
     """The derivatives of an exact motion to its initial state and to parameters, with the saltation of every event.
 
-    Along an arc u = dq/dc obeys u'' = a_q u + a_v u' + a_c, expanded beside the motion in the same steps. At an impact with
-    v+ = R(v-, t, c), whose time moves by dt = (x_c - u-) / v-, x(c) being the contact,
+    Along an arc u = dq/dc obeys u'' = a_q u + a_v u' + a_c, which is expanded together with the motion, in the same steps. At an
+    impact v+ = R(v-, t, c) at the contact x(c), whose time has the derivative dt = (x_c - u-) / v-,
 
-        u+ = x_c - v+ dt,     u'+ = R_v (u'- + a_old dt) + R_t dt + R_c - a_new dt,
+        u+ = x_c - v+ dt,     u'+ = R_v (u'- + a_old dt) + R_t dt + R_c - a_new dt.
 
-    whose determinant is R_v v+ / v-. A release moves with the root of the contact acceleration; at rest the derivatives are
-    those of the contact. With several contacts the law of those that act is differentiated (see `contacts/contact_tangent.py`).
+    The determinant of this map is R_v v+ / v-. A release moves with the root of the contact acceleration; at rest the derivatives
+    are those of the contact's position. With several contacts the law of the acting contacts is differentiated (see
+    `contacts/contact_tangent.py`).
 
     Parameters
     ----------
@@ -150,7 +151,7 @@ def sensitivities(
     Raises
     ------
     ParameterError
-        A path to no number, with the near ones; an argument without meaning.
+        A path leads to no number (the message has similar paths), or another argument has no meaning.
     MotionError
         As for `simulate`.
 
@@ -197,13 +198,13 @@ def derivatives_of(request: MotionRequest, run: Program | None, progress: Progre
 
 
 def _paths(system: System, parameters: Iterable[str]) -> tuple[str, ...]:
-    """The parameters to differentiate to, of a system whose motion has derivatives here."""
+    """The checked paths of the parameters to differentiate to."""
     check_system(system, "sensitivities", several_contacts=True)
     return check_names("parameters", parameters, "parameters, such as ['load.frequency']")
 
 
 def _end_shift(followed: Followed, paths: tuple[str, ...], periods: float | None) -> np.ndarray:
-    """How the time at the end moves with each column: with a margin that ends the motion, or with the forcing period."""
+    """The shift of the time at the end along each column: with the margin that ends the motion, or with the forcing period."""
     motion, shift = followed.motion, np.zeros(followed.columns.shape[1])
     if motion.stop is Stop.LIMIT:
         return np.asarray(followed.shifts[-1])
@@ -233,7 +234,7 @@ def state_rates(motion: Motion) -> np.ndarray:
 
 
 def _undefined(motion: Motion, columns: np.ndarray) -> str | None:
-    """Why not every column has a number: the last event that took its derivative from the motion."""
+    """Why some columns are nan: the last event at which the motion has lost its derivative; None if all are finite."""
     if np.isfinite(columns).all():
         return None
     for event, detail in zip(reversed(motion.events), motion.events.details[::-1], strict=True):

@@ -48,30 +48,30 @@ def simulate(
     velocity
         The velocity at the start (a tuple where there are several coordinates, or 0 for all).
     periods, duration
-        How long, in forcing periods or in dimensionless time; one of them.
+        The length of the motion, either in forcing periods or in dimensionless time.
     tol
         The error that one step may make, relative to the state, in [1e-15, 1e-6].
     time
         The dimensionless time at the start.
     side
-        +1 or -1, the side to leave by where the motion from rest at contact is not unique.
+        The side, +1 or -1, to which the motion goes from rest at the contact if that is not unique.
     stop_at
-        Margins of the model that end the motion, such as "kinematic_limit"; its own `stops` always do.
+        Margins of the model that end the motion, such as "kinematic_limit"; the model's own `stops` always do.
     dense
-        Keep the motion between the events; False keeps the events alone.
+        Whether to keep the motion between the events; with False only the events are kept.
     times
-        At which to keep the states instead, for a motion too long to be kept whole.
+        Times at which the states are kept in place of the whole motion, for motions that are too long to be kept whole.
     progress
-        Called with the fraction done and what is being done, now and then.
+        Called from time to time with the fraction done and what is being done.
     coordinates
         The state at the start by the model's names: theta=0.3, or x=0.0 for a wall oscillator.
 
     Raises
     ------
     ParameterError
-        An argument without meaning.
+        An argument has no meaning.
     MotionError
-        The motion is not unique, an impact has no solution, or the numbers overflow; with the instant.
+        The motion is not unique, an impact has no solution, or the numbers overflow; the message says at which time.
 
     Examples
     --------
@@ -97,15 +97,15 @@ def simulate(
 
 @dataclass(frozen=True)
 class Followed:
-    """A motion, and what the kernel has left of its tangent."""
+    """A motion with its tangent at the end."""
 
     motion: Motion
     columns: np.ndarray  # (2 degrees of freedom, columns): of the coordinates, then of the velocities, at the end
-    shifts: np.ndarray  # (events, columns): how the time of each event moves
+    shifts: np.ndarray  # (events, columns): the shift of each event
 
 
 def follow(request: MotionRequest, progress: Progress, run: Program | None = None) -> Followed:
-    """`simulate`, and its tangent if the request asks for it, with the request's program if that is known."""
+    """Follow the motion of a request, with its tangent if the request asks for one; `run` is its program, if that is known."""
     run = run or program(request.system, request.limits, request.sensitivities)
     now = (ContactState if request.system.model.held else KernelState).at_start(request, run)
     recorder = Recorder(request, int(now.where[Where.ORDER]), int(now.where[Where.COLUMNS]))
@@ -143,7 +143,7 @@ def _advance(system: System, run: Program, now: KernelState, recorder: Recorder,
 
 
 def _at_contacts(system: System, recorder: Recorder) -> str:
-    """Where the last impacts were, and what the law leaves of a speed there; empty for a model with one contact."""
+    """The contacts of the last impacts with their restitution, in words; empty for a model with one contact."""
     if not system.model.contacts:
         return ""
     matrix, hit = system.impact.restitution_matrix(system.model), recorder.last_hit()
@@ -151,7 +151,7 @@ def _at_contacts(system: System, recorder: Recorder) -> str:
 
 
 def _why_so_many(system: System, recorder: Recorder) -> str:
-    """Why impacts follow so fast on one another, and what to change."""
+    """Why impacts follow one another so fast, and what to change, in words."""
     matrix = system.impact.restitution_matrix(system.model) if system.model.contacts else []
     if any(float(matrix[i][i]) == 1.0 for i in (recorder.last_hit() if system.model.contacts else ())):
         return (
@@ -162,7 +162,7 @@ def _why_so_many(system: System, recorder: Recorder) -> str:
 
 
 def _refuse(system: System, status: int, now: KernelState) -> None:
-    """Turn a status that is not an end into a sentence."""
+    """Raise an error, with a sentence, for a status that is no regular end of a motion."""
     at, velocity = f"at time {now.time:.9g}", now.velocity[0]
     if status in (Status.NOT_UNIQUE, Status.NO_IMPACT) and system.model.held:
         choice = "no choice of closed contacts, and of what sticks, is consistent"

@@ -1,4 +1,4 @@
-"""One step: how long it may be, and what is kept of it.
+"""One step of the scalar flow: its Taylor series, its length, and its records.
 
 Its compiled part goes into one module with that of `kernel.py`.
 """
@@ -52,7 +52,7 @@ def expand(where, state, env, model, work, t, origin, side, order):
 
 @lean_jit
 def growth(coefficients, first, last, size):
-    """The largest log(abs(c_k) / size) / k for first <= k <= last: minus the log of the radius that these terms suggest."""
+    """The largest log(abs(c_k) / size) / k for first <= k <= last: minus the log of the radius of convergence by these terms."""
     largest = -np.inf
     for i in range(coefficients.shape[0]):
         for k in range(first, last + 1):
@@ -63,10 +63,10 @@ def growth(coefficients, first, last, size):
 
 @lean_jit
 def step_size(coefficients, order, size, tol):
-    """h such that the last two terms of the series are below tol, relative to `size`.
+    """The step h at which the last two terms of the series are tol, relative to `size`.
 
-    By symmetry both may be far smaller than the series: x'' = -x^3 from x = 0 has every fourth coefficient only. Then the
-    upper half of the coefficients says how fast it grows.
+    By symmetry both terms may be far too small: for x'' = -x^3 from x = 0 only every fourth coefficient is not 0. The growth of
+    the series is then taken from the upper half of the coefficients.
     """
     size = max(size, SMALLEST)
     at_end, before_end = growth(coefficients, order, order, size), growth(coefficients, order - 1, order - 1, size)
@@ -79,9 +79,10 @@ def step_size(coefficients, order, size, tol):
 
 @lean_jit
 def leaps(where, env, model, work, t, origin, side, h, size, tol):
-    """Whether a step goes past what its series cannot see, such as the bend of a saturated tanh, below rounding from afar.
+    """Whether a step passes a feature of the acceleration that its series cannot show, such as the bend of a saturated tanh,
+    whose coefficients are below rounding far away from it.
 
-    The acceleration at the end of the step is then not the one that the series gives there.
+    It is noticed because the model's acceleration at the end of the step then differs from that of the series.
     """
     q, v, a, _, _, w, _, _, (q_end, v_end, a_end, g_end, m_end) = work
     order = where[Where.ORDER]
@@ -113,20 +114,20 @@ def record_event(where, events, kind, side, detail, t, before, after):
     labels[i, 0], labels[i, 1], labels[i, 2], labels[i, 3] = where[Where.PERIOD], kind, side, detail
     values[i, 0], values[i, 1], values[i, 2] = t, before, after
     for j in range(where[Where.COLUMNS]):
-        values[i, 3 + j] = math.nan  # unless `record_shift` knows better
+        values[i, 3 + j] = math.nan  # until `record_shift` sets it
     where[Where.EVENTS] = i + 1
 
 
 @lean_jit
 def record_shift(where, state, events):
-    """Note with the last event how its time moves with each column of the tangent, as `tangent` has left it in the state."""
+    """Record with the last event its shift along each column, which `tangent` has put into the state."""
     for j in range(where[Where.COLUMNS]):
         events[1][where[Where.EVENTS] - 1, 3 + j] = state[State.COORDINATES + 2 * where[Where.DOF] + j]
 
 
 @lean_jit
 def forget(where, state):
-    """There is no tangent from here on."""
+    """Set the tangent to nan: there are no derivatives from here on."""
     coordinates, velocities = State.COORDINATES, State.COORDINATES + where[Where.DOF]
     for i in range(where[Where.OWN], where[Where.DOF]):
         state[coordinates + i] = state[velocities + i] = math.nan
@@ -149,7 +150,7 @@ def column_step(where, q, v, a, order, tol):
 
 @lean_jit
 def record_step(where, steps, side, t, h, q):
-    """Append a step of the dense output: where it starts, how long it is, and the coordinates' series."""
+    """Append a step of the dense output: its start, its length, and the coordinates' series."""
     if where[Where.DENSE] == 0:
         return
     labels, spans, coefficients = steps

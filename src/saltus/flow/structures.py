@@ -1,4 +1,4 @@
-"""Systems ready to run: the compiled code of their structure, found or made, and their numbers."""
+"""Systems ready to run: the compiled code of their structure, from the disk or made, and their numbers."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from saltus.flow.compiled import Structure, load_structure
 from saltus.systems import System, numbers
 from saltus.taylor import Trace, record_table, structure_key, trace
 
-OFF_CONTACT = 1e-9  # of a gap at the contact, relative to its rate: far above rounding, far below what a model would mean
+OFF_CONTACT = 1e-9  # the largest gap at the contact, relative to its rate, that may be rounding; an error of a model is larger
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,8 @@ class Program:
 
 
 def program(system: System, limits: tuple[str, ...] = (), sensitivities: tuple[str, ...] | None = None) -> Program:
-    """A system ready to run, with a tangent if asked. Its structure is traced and compiled, or found; numbers are only read."""
+    """A system ready to run, with a tangent if asked for. Its structure is traced and compiled unless it is known; its numbers
+    are only filled in."""
     key = (structure_key(system), limits, sensitivities)
     if key not in _structures:
         traced = trace(system, limits, sensitivities)
@@ -56,7 +57,7 @@ def limits_of(system: System, stop_at: Iterable[str]) -> tuple[str, ...]:
 
 
 def taylor_order(tol: float) -> int:
-    """The order that pays at a tolerance: 10 at 1e-6, 15 at 1e-10, 20 at 1e-14."""
+    """The order of series that is fastest at a tolerance: 10 at 1e-6, 15 at 1e-10, 20 at 1e-14."""
     return round(10 + 1.25 * (-math.log10(tol) - 6))
 
 

@@ -10,16 +10,14 @@ import numpy as np
 from saltus.flow.dense_output import DenseOutput, evaluate
 from saltus.systems import System, energy_gain
 
-STEP_SAMPLES = 12  # in each step, to find changes of sign: a step is shorter than a margin's own time scale
-GAIN_ROUNDING = 1e-12  # An impact that gains a smaller share of the energy keeps it.
+STEP_SAMPLES = 12  # samples in each step to find changes of sign; a step is shorter than the time scale of a margin
+GAIN_ROUNDING = 1e-12  # A smaller share by which an impact raises the energy is rounding.
 RIDDERS_ITERATIONS = 8  # of Ridders' method, each of which doubles the correct digits or at least halves the bracket
 
 
 @dataclass(frozen=True)
 class Validity:
-    """For each margin of the model: when it is first passed (or None), and the share of the motion's time spent beyond it.
-
-    `gains` has the contacts at which the impact law may raise the kinetic energy, and by what share of it (see `energy_gain`).
+    """The validity of a motion: which margins of the model it passes, and for what share of the time.
 
     Attributes
     ----------
@@ -55,7 +53,7 @@ class Validity:
         return "; ".join(parts) or "the model has no margins"
 
     def gain(self, contact: str) -> str:
-        """What the impact law does to the energy at a contact in `gains`.
+        """A sentence about the energy that impacts may gain at a contact in `gains`.
 
         Parameters
         ----------
@@ -69,7 +67,7 @@ class Validity:
 class ValidityCheck:
     """Evaluates the model's margins along dense output, given in one piece or in several; their zeros are found to rounding.
 
-    A margin that is passed and regained within a twelfth of one step may be missed. Rest is left out: nothing moves there.
+    A margin that is passed and regained within a twelfth of one step may be missed. Times of rest are left out.
     """
 
     def __init__(self, system: System) -> None:
@@ -81,7 +79,7 @@ class ValidityCheck:
         self._beyond: dict[str, float] = dict.fromkeys(names, 0.0)
 
     def add(self, dense: DenseOutput) -> None:
-        """Go on along the next piece."""
+        """Evaluate the margins along the next piece of dense output."""
         moving = np.flatnonzero((dense.side != 0) & (dense.length > 0))
         if not self._first or not moving.size:
             return
@@ -94,7 +92,7 @@ class ValidityCheck:
                 self._first[name] = first
 
     def result(self, duration: float) -> Validity:
-        """The verdict on a motion of that duration."""
+        """The validity of a motion of this duration."""
         model, shares = (
             self._system.model,
             {name: beyond / duration if duration else 0.0 for name, beyond in self._beyond.items()},
@@ -106,7 +104,7 @@ class ValidityCheck:
 def _beyond(
     system: System, dense: DenseOutput, name: str, value: np.ndarray, tau: np.ndarray, step: np.ndarray
 ) -> tuple[float | None, float]:
-    """The first time at which a margin is negative, and for how long it is, from its samples on every step."""
+    """The first time at which a margin is negative, and the total time for which it is, from its samples in every step."""
     value = np.broadcast_to(value, tau.shape)
     left, right = np.arange(value.size - 1), np.arange(1, value.size)
     same = step[left] == step[right]
@@ -133,7 +131,7 @@ def _sign_change(
     left: np.ndarray,
     right: np.ndarray,
 ) -> np.ndarray:
-    """Where a margin changes its sign between the samples `left` and `right`, by Ridders' method for all at once."""
+    """The times at which a margin changes its sign between the samples `left` and `right`, by Ridders' method for all at once."""
     low, high, at_low, at_high = tau[left], tau[right], value[left], value[right]
     root = low
     for _ in range(RIDDERS_ITERATIONS):

@@ -1,4 +1,4 @@
-"""What repeats: periodic orbits of the exact system, their branches and special points."""
+"""Periodic orbits of the exact system, their branches along parameters, and the special points of these branches."""
 
 from saltus._front_door import front_door
 

@@ -1,4 +1,4 @@
-"""What an experimenter reads off a motion: how much of the load's motion it passes on, and how much power it dissipates."""
+"""Averages over time that experimenters measure: the transmissibility of a motion, and the mean power that it dissipates."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from saltus.systems import Model, System
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(
     16
-)  # of each step: exact for polynomials to order 31, and a step has order 23 at most
+)  # Gauss's rule in each step: exact for polynomials up to degree 31, and a step's Taylor series has order 23 at most
 Followed = Motion | PeriodicOrbit | RestingOrbit | FreeOrbit
 Response = Callable[[np.ndarray, Any, Any], Any]
 
 
 @dataclass(frozen=True)
 class _Course:
-    """A motion between two times at Gauss's points of its steps: states (coordinates, n), all else (n,)."""
+    """A motion between two times, sampled at Gauss's points of its steps: states are (coordinates, n), all else is (n,)."""
 
     motion: Motion
     begin: float
@@ -53,30 +53,30 @@ class _Course:
 
 @answered
 def transmissibility(of: Followed, channel: str, response: Response | None = None, *, periods: int | None = None) -> float:
-    """How much larger a response is than what drives it: the ratio of their standard deviations over time,
+    """The ratio of the standard deviations over time of a response and of the load that drives it,
 
         T = sigma(r) / sigma(u),    sigma(f)^2 = (1/D) int (f - mean f)^2 dt,
 
-    of the channel u of the load (its value: a force, or a displacement of the ground) and the response r, over one period of an
-    orbit or the last forcing periods of a motion, of duration D. Of harmonics it is the ratio of their amplitudes.
+    for the channel u of the load (its value: a force, or a displacement of the ground) and the response r, over one period of an
+    orbit or the last forcing periods of a motion, of duration D. For harmonic functions it is the ratio of their amplitudes.
 
     Parameters
     ----------
     of
         An orbit, or a motion that was kept densely.
     channel
-        Of the load, such as "horizontal".
+        The name of a channel of the load, such as "horizontal".
     response
         r(t, position, velocity) of arrays, such as the force on the ground k x + c x', or x plus the ground's
         displacement; by default the first coordinate. With several coordinates positions and velocities are arrays
         (coordinates, n).
     periods
-        The last forcing periods of a motion, by default 1; all of it under a load without a frequency.
+        How many of the last forcing periods of a motion are used, by default 1; under a load without a frequency all of it.
 
     Raises
     ------
     ParameterError
-        A channel that does not vary, a motion that was not kept or is shorter, a response that is no numbers.
+        The channel does not vary, the motion was not kept densely or is too short, or the response does not return numbers.
 
     Examples
     --------
@@ -108,7 +108,7 @@ def transmissibility(of: Followed, channel: str, response: Response | None = Non
 
 @answered
 def mean_dissipated_power(of: Followed, *, periods: int | None = None) -> float:
-    """The energy that damping, friction and impacts take, divided by the time:
+    """The energy that damping, friction and impacts dissipate, divided by the time:
 
         P = (1/D) { sum over impacts [v- M- v- - v+ M+ v+] / 2 - int v f_d dt + sum over frictions int mu_k N abs(v - w) dt },
 
@@ -116,20 +116,20 @@ def mean_dissipated_power(of: Followed, *, periods: int | None = None) -> float:
 
     over one period of an orbit or the last forcing periods of a motion, of duration D. M is the mass (of the mass matrix, or
     twice the kinetic energy over v^2), f = M q'' the generalised force and f_d its part that is odd in the velocity, such as -c
-    v; velocities are those beside the ground. On a periodic orbit it is the mean power of the load, and of moving
-    grounds. For load (i) the unit is that of K2 over the unit of time.
+    v; velocities are relative to the ground. On a periodic orbit P equals the mean power that the load and moving
+    grounds supply. For load (i) its unit is that of K2 over the unit of time.
 
     Parameters
     ----------
     of
         An orbit, or a motion that was kept densely.
     periods
-        The last forcing periods of a motion, by default 1; all of it under a load without a frequency.
+        How many of the last forcing periods of a motion are used, by default 1; under a load without a frequency all of it.
 
     Raises
     ------
     ParameterError
-        A motion that was not kept or is shorter; a model that gives neither its kinetic energy nor its mass
+        The motion was not kept densely or is too short; or the model gives neither its kinetic energy nor its mass
         matrix.
 
     Examples
@@ -202,7 +202,7 @@ def _damping_power(course: _Course) -> Any:
 
 
 def _friction_power(course: _Course) -> Any:
-    """What frictions take at every time, (n,)."""
+    """The power that frictions dissipate at every time, (n,)."""
     model, taken = course.system.model, np.zeros_like(course.time)
     if not model.frictions:
         return taken
@@ -220,14 +220,14 @@ def _rows(forces: Any, times: np.ndarray) -> list[np.ndarray]:
 
 
 def _mass(course: _Course, time: Any, q: Any, side: Any) -> Any:
-    """M on a side: T(1) + T(-1) - 2 T(0), T being quadratic in the velocity."""
+    """The mass M on a side, T(1) + T(-1) - 2 T(0), as the kinetic energy T is quadratic in the velocity."""
     model, load = course.system.model, course.system.load
     forth, back, still = (model.kinetic_energy(time, q, v, side, load) for v in (1.0, -1.0, 0.0))
     return forth + back - 2 * still
 
 
 def _impact_losses(course: _Course) -> float:
-    """What all impacts take."""
+    """The energy that all impacts dissipate."""
     model, impacts = course.system.model, course.motion.impacts
     late = (impacts.time > course.begin) & (impacts.time <= course.end)
     if not late.any():

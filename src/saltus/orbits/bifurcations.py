@@ -43,11 +43,12 @@ def scaled_determinant(matrix: np.ndarray) -> float:
 
 
 def torus(point: OrbitPoint) -> float:
-    """The product, over all pairs of multipliers, of their product less 1: smooth, and 0 where a complex pair has the modulus 1.
+    """The product of (a b - 1) over all pairs (a, b) of multipliers: smooth, and 0 where a complex pair has the modulus 1.
 
-    A real pair may have that product as well, which is no special point. 0 where it is so but for rounding all along, and -1
-    where it grazes, as it is not known there. Of two multipliers it is that of the segments' determinants, which no large
-    multiplier hides.
+    It is 0 at a real pair with a b = 1 as well, which is no special point; `BranchEvents.distinct` removes these zeros. A value
+    within rounding of 0 is given as 0, as all along a branch of a system without loss; at a grazing the multipliers are unknown
+    and it is -1. For two multipliers a b comes from the determinants of the segments' maps: their product keeps its digits
+    where one multiplier is large.
     """
     values, equations = point.orbit.multipliers, point.equations
     if point.orbit.grazes:
@@ -73,50 +74,52 @@ def _areas(maps: np.ndarray) -> np.ndarray:
 def complex_pair(orbit: PeriodicOrbit) -> float:
     """The largest modulus of a complex pair of multipliers; 0 where there is none.
 
-    Multipliers of 0, which contacts make, are such pairs by rounding.
+    Closed contacts make multipliers 0, and rounding turns these into small complex pairs, which do not count.
     """
     values = orbit.multipliers
     return float(np.abs(values[(np.abs(values.imag) > 1e-9) & (np.abs(values) > VANISHING)]).max(initial=0.0))
 
 
 def never_torus(orbit: PeriodicOrbit) -> bool:
-    """Whether areas of states never grow, so that no pair of multipliers leaves the unit circle (errata 22)."""
+    """Whether the flow never enlarges areas of the state plane, so that no complex pair can leave the unit circle (errata 22)."""
     return area_contraction(orbit.system) is not None
 
 
 def grazing(point: OrbitPoint) -> float:
-    """The least of the impacts' speeds, the gap's inner minima and what holds closed contacts: below 0 there is no orbit.
+    """The least of the impacts' speeds, of the gap's minima between impacts, and of `pressing`: where it is negative the solution
+    of the equations is no motion.
 
-    Where the contact is no singularity there is one on both sides, and nothing to stop at.
+    Where the contact is no singularity, orbits exist on both sides of a grazing and a branch need not stop there: inf.
     """
     orbit = point.orbit
     return math.inf if orbit.problem.passes_contact else min(orbit.slowest, orbit.clearance, orbit.pressing)
 
 
 def touching(point: OrbitPoint) -> float:
-    """How far an orbit is from touching a contact that is no singularity; its sign turns with each pair of passages more."""
+    """How far an orbit is from touching a contact that is no singularity; the sign changes with each additional pair of passages
+    through the contact."""
     orbit, extremes = point.orbit, point.equations.extremes
     pairs = int(extremes[:, at.CROSSINGS].sum()) // 2
     return float((-1) ** pairs * min(NEAREST, orbit.clearance, orbit.shallowest))
 
 
-PRODUCT_ROUNDING = 1e-12  # by which a product of multipliers may differ from 1 where nothing is lost
-# Multipliers smaller than the largest one by this factor are 0 but for rounding, whose product with it may have any size.
+PRODUCT_ROUNDING = 1e-12  # the difference of a product of multipliers from 1 that rounding makes in a system without loss
+# Multipliers smaller than the largest one by this factor are rounding errors of 0: their products with it have no meaning.
 MULTIPLIER_ROUNDING = 1e-12
-VANISHING = 1e-4  # modulus below which a complex pair of multipliers is one of zeros, by the root of rounding
-NEAREST = 1.0  # upper limit of the distance of an orbit from a grazing, which would be infinite for one that never turns
+VANISHING = 1e-4  # a complex pair of smaller modulus is a double multiplier 0: rounding moves it by the root of its size
+NEAREST = 1.0  # upper limit of the distance of an orbit from a grazing, which is infinite for one whose gap has no minimum
 
 
-CHANGES = {"decisive": True, "guides": True}  # of stability, smoothly
+CHANGES = {"decisive": True, "guides": True}  # tests whose zeros are smooth changes of stability
 FLIP = {symmetric: Test(SpecialKind.BPC if symmetric else SpecialKind.PD, flip, **CHANGES) for symmetric in (True, False)}
 FOLD, CROSSING = Test(SpecialKind.LP, fold, **CHANGES), Test(SpecialKind.BPC, crossing, singular=True, **CHANGES)
 TORUS = Test(SpecialKind.NS, torus, decisive=True)
 TOUCHING = Test(SpecialKind.GR, touching)
-GRAZING = Test(SpecialKind.GR, grazing, 1e-15)  # narrower than others: beside a grazing motions part by the square root
+GRAZING = Test(SpecialKind.GR, grazing, 1e-15)  # narrower than others: beside a grazing an error grows to its square root
 
 
 def branch_tests(point: OrbitPoint, functions: dict[str, UserFunction]) -> Iterator[Test]:
-    """The test functions of a branch at a point that are zero at a special point, but for grazings."""
+    """All test functions of a branch at a point, but that of grazings at a contact that is a singularity (`GRAZING`)."""
     yield from (FOLD, FLIP[point.orbit.symmetric], CROSSING, TORUS)
     if point.orbit.problem.passes_contact:
         yield TOUCHING

@@ -28,25 +28,25 @@ START = End(OrbitEnd.START)
 @answering("at")
 @dataclass(frozen=True, eq=False)
 class Branch(Result, Course[OrbitPoint | RestingPoint, SpecialPoint]):
-    """A branch: its points in order, the special ones among them, and why it ends on both sides.
+    """A branch: its points in order, its special points, and why it ends on both sides.
 
     A family of resting orbits is a branch as well: `special` then holds grazings (GR), the zeros of margins and functions, and
-    the ends RL and CH.
+    the two ends special to such families, RL and CH.
 
     Attributes
     ----------
     points
         The points in order, each with its `orbit` and its parameters.
     special
-        The special ones among them, each a `SpecialPoint`.
+        The special points, each a `SpecialPoint`.
     ends
-        Why it ends, at its first point and at its last one.
+        Why the branch ends at its first point and at its last one.
     missed
-        What was seen on the way and could not be located, each with its reason.
+        The special points that were noticed on the way and could not be located, each with its reason.
     path
         The dotted path of the parameter.
     origin
-        What it was begun from: a start, or the special point of another branch.
+        Where the branch begins: at an orbit that was given, or at a special point of another branch.
 
     Examples
     --------
@@ -83,7 +83,7 @@ class Branch(Result, Course[OrbitPoint | RestingPoint, SpecialPoint]):
         Raises
         ------
         ParameterError
-            What is no finite number.
+            `value` is no finite number.
         """
         check_number("value", value)
         return [point.orbit for point in self.solved_at(value)]

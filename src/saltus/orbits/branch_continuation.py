@@ -24,7 +24,7 @@ from saltus.orbits.symmetry import full_period, half, keeps_symmetry
 from saltus.progress import Progress, silent
 
 STEP = STEPS.longest  # the longest step: a thirtieth of the parameter's range, or a tenth of a radian and of a unit of speed
-# Towards a value not far away steps are as long as the way there and as the units of the phases and the speeds.
+# To a nearby value of the parameter a single step may go all the way, and change phases and speeds by 1.
 NEARBY_STEPS = replace(STEPS, longest=1.0, first=0.1)
 
 
@@ -49,19 +49,19 @@ def continue_orbit(
     bounds
         The least and the largest value of the parameter.
     functions
-        Further functions of an orbit whose zeros are special points, by name. Those of the model's margins are
-        found anyway.
+        Further functions of an orbit whose zeros are special points, by name. Zeros of the model's margins are
+        found in any case.
     step
         The longest step, in the norm of `OrbitCurve`.
     while_stable
-        Whether to end just beyond the loss of stability; an orbit that rests never loses it.
+        Whether to end just beyond the loss of stability; orbits that rest for a part of their period never lose it.
     progress
         Called with the share of the range that has been seen and the value of the parameter.
 
     Raises
     ------
     ParameterError
-        What is no orbit, an unknown parameter, bounds that exclude the orbit, a step that leads nowhere.
+        `orbit` is no orbit, the parameter is unknown, the bounds exclude the orbit, or the step is outside [1e-6, 1].
 
     Examples
     --------
@@ -86,8 +86,8 @@ def continue_orbit(
 
 
 def follow_stable(orbit: PeriodicOrbit, path: str, target: float) -> Branch:
-    """The branch of a stable orbit towards a value of the parameter not far away, up to there or to just beyond the loss of
-    its stability; in long steps, to find that out."""
+    """The branch of a stable orbit up to a nearby value of the parameter, or to just beyond its loss of stability if that comes
+    first. The steps are long, because only this outcome is asked for."""
     value = float(orbit.system.get(path))
     low, high = _checked(orbit, path, (min(value, target), max(value, target)))
     first: Any
@@ -130,7 +130,10 @@ def _checked(orbit: PeriodicOrbit, path: str, bounds: Any) -> tuple[float, float
 
 
 def along(orbit: PeriodicOrbit, path: str) -> tuple[PeriodicOrbit, bool]:
-    """An orbit as a solution of the problem along a parameter, halved where it and the system are and stay symmetric."""
+    """An orbit as a solution of the problem along a parameter, and whether the system keeps its mirror symmetry along it.
+
+    A symmetric orbit is given by half of its period if the system keeps its symmetry, otherwise by all of it.
+    """
     system, signature = orbit.system, orbit.signature
     symmetric = keeps_symmetry(system, path)
     problem = problem_of(system, signature, (path,))
@@ -148,7 +151,7 @@ def along(orbit: PeriodicOrbit, path: str) -> tuple[PeriodicOrbit, bool]:
 
 
 def _in_other_equations(orbit: PeriodicOrbit, path: str) -> PeriodicOrbit | None:
-    """An orbit whose contact is a singularity for other values of the parameter, or no longer one, as a solution there."""
+    """The orbit solved for again, if the parameter that is now varied decides whether its contact is a singularity."""
     position, velocity = orbit.state
     state = {orbit.system.model.coordinates[0]: position, "velocity": velocity}
     return orbit_near(Problem(orbit.system, Signature((), 1), (path,)), state, orbit.period)

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 
 def branch_dataset(branch: Branch) -> xarray.Dataset:
-    """Points along `point`, special points along `special`.
+    """The dataset of a branch: points along `point`, special points along `special`.
 
-    `stable` and `symmetric` are 0 or 1; `unknowns` and `sides` hold each orbit's own (see `problem.py`), filled up with nan and
-    0. Orbits that rest have the times of `releases` and `rests` besides. Of both ends the attributes hold the sentence
-    (`ends`), the reason as a word (`end_reasons`) and the kind of the special point there, if any (`end_kinds`).
+    `stable` and `symmetric` are 0 or 1; `unknowns` and `sides` are those of each orbit (see `problem.py`), padded with nan and
+    0 to one length. Orbits that rest also have the times of their `releases` and `rests`. The attributes hold, for both ends, the
+    sentence (`ends`), the reason as a word (`end_reasons`) and the kind of the special point there, if any (`end_kinds`).
     """
     import xarray
 
@@ -46,7 +46,7 @@ def branch_dataset(branch: Branch) -> xarray.Dataset:
 
 
 def _columns(orbits: list[PeriodicOrbit]) -> list[tuple[str, np.ndarray, dict[str, str]]]:
-    """What is one number of each orbit."""
+    """The quantities that are one number for each orbit."""
     model = orbits[0].problem.system.model
     angle, coordinate = {"units": model.unit_of(model.coordinates[0])}, " or ".join(model.coordinates)
 
@@ -83,14 +83,14 @@ def _rests(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
 
 def multiplier_columns(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
     """The multipliers of each orbit, in rows of one length."""
-    every = [orbit.multipliers for orbit in orbits]  # those that closed contacts make 0 are more or fewer
+    every = [orbit.multipliers for orbit in orbits]  # their number varies: what contacts hold has none
     values = np.array([np.pad(one, (0, max(map(len, every)) - len(one))) for one in every])
     dims = ("point", "multiplier")
     return {"multiplier_real": (dims, values.real), "multiplier_imag": (dims, values.imag)}
 
 
 def solution_columns(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
-    """The signature of each orbit and its equations' own unknowns, in rows of one length: what `orbits_of` reads."""
+    """The signature of each orbit and the unknowns of its equations, in rows of one length, as `orbits_of` reads them."""
     width = max(orbit.problem.size for orbit in orbits)
     unknowns = np.full((len(orbits), width), np.nan)
     sides = np.zeros((len(orbits), max(1, max(len(orbit.signature.sides) for orbit in orbits))), dtype=np.int8)
@@ -149,5 +149,5 @@ def _special(special: tuple[SpecialPoint, ...]) -> dict[str, Any]:
 
 
 def _dtype(name: str) -> type:
-    """Of a column of special points, which may have no rows."""
+    """The type of a column of special points, which NumPy cannot tell if the column has no rows."""
     return str if name == "kind" else int if name in ("special_impact_count", "special_period") else float

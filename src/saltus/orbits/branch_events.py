@@ -1,4 +1,4 @@
-"""What happens along a branch of orbits: special points, grazings that are gone through, and the ways in which it ends."""
+"""The events along a branch of orbits: special points, passages through grazings, and the ways in which the branch ends."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ Run = Continuation
 
 @dataclass(frozen=True)
 class BranchLimits:
-    """Where a branch is given up, and how its events are told from rounding."""
+    """When the continuation of a branch is given up, and how its events are told apart from rounding errors."""
 
     most_impacts: int = 120  # Orbits with more impacts in a period than this are not followed.
     # Grazings are taken to accumulate when this many in a row have each added impacts, and one of the next two conditions holds.
@@ -58,15 +58,15 @@ class BranchLimits:
     shrunk_impacts: int = 60
     # With a multiplier above this, neighbouring motions separate so fast that an orbit cannot be solved for.
     steepest: float = 1e8
-    on_circle: float = 1e-9  # Without damping multipliers lie on the unit circle, but for rounding that is below this.
+    on_circle: float = 1e-9  # Without damping multipliers lie on the unit circle, up to rounding errors smaller than this.
     smallest: float = 1e-7  # An orbit of an amplitude below this has shrunk to rest.
-    # An orbit of an amplitude above this, and above this many times that of the orbit with which its branch was begun, grows
-    # without end: it has taken a thousand of the longest steps to come there.
+    # An orbit grows without end if its amplitude exceeds this, and exceeds that of the first orbit of the branch by this factor:
+    # a thousand of the longest steps lead there.
     largest: float = 1e2
     same_fold: float = 1e-8  # A fold and a crossing of branches whose parameters differ by less than this are one point.
-    # A complex pair of multipliers beyond the unit circle by more than this, where areas never grow, is an error of the package.
+    # A complex pair of multipliers outside the unit circle by more than this, where areas never grow, is an error of saltus.
     impossible_pair: float = 1e-6
-    # Distances to both sides along a parent's branch, tried in turn until its special point lies between the two ends.
+    # Distances in both directions along the parent's branch, tried in turn until they enclose its special point.
     reaches: tuple[float, ...] = tuple(10.0 ** np.arange(-8, -0.9))
 
 
@@ -87,7 +87,7 @@ class OrbitEvents(Events):
         return nearest(point, place, other)
 
     def closing(self, first: OrbitPoint, ahead: OrbitPoint) -> OrbitPoint:
-        """The first orbit of a loop, with its state at the section with which the loop comes back."""
+        """The first orbit of a closed branch, by its state at the section that the branch has when it returns to it."""
         return with_section_of(first, ahead)
 
 
@@ -98,29 +98,30 @@ class BranchEvents(OrbitEvents):
     functions: dict[str, UserFunction] = field(default_factory=dict)
     until: SpecialKind | None = None  # the kind of special point at which to end
     while_stable: bool = False  # whether to end beyond the loss of stability
-    # The last step that was asked for its cut: a step is accepted by it, and then cut by it.
+    # The last step whose cut was computed: the cut decides first whether the step is accepted, then where it ends.
     last_cut: tuple[OrbitPoint, OrbitPoint, Cut | End | None] | None = None
 
     name = "branch"
     keeps_special = True  # so that a line through the points shows the fold
 
     def accepts(self, point: OrbitPoint, ahead: OrbitPoint) -> bool:
-        """Whether a step has not gone over to the orbits that are their own images, nor, from one grazing, beyond the next."""
-        begun = point.iterations == 0  # with the signature of the other side of a grazing, where nothing had to be solved
+        """Whether a step may be taken: not if it has jumped onto the branch of the orbits that are their own images, nor if it
+        begins at one grazing and has gone past the next one."""
+        begun = point.iterations == 0  # the first point beyond a grazing: its unknowns are known without solving
         skipped = begun and grazing(point) <= TOLERANCES.touch and grazing(ahead) < 0.0
         if isinstance(point.orbit.problem, FollowedProblem):
             if abs(ahead.orbit.multipliers[0]) > SETTINGS.steepest:
-                return False  # towards a change at which they grow without end: further steps would be rounding
+                return False  # multipliers grow without bound towards some changes of events: further steps would be rounding
             if isinstance(self.cut(point, ahead), End):
-                return False  # the orbits ahead are others, as no way with a change of events leads there
+                return False  # no change of events leads to the orbits ahead, so they belong to another branch
         return not skipped and not falls_onto_image(point, ahead)
 
     def barrier(self, point: OrbitPoint) -> Test:
-        """A grazing, or a change of the events that an orbit is followed through, which is gone through."""
+        """The test function of grazings or, for orbits that are followed through their events, of changes of these events."""
         return same_events(point) if isinstance(point.orbit.problem, FollowedProblem) else GRAZING
 
     def cut(self, point: OrbitPoint, ahead: OrbitPoint) -> Cut | End | None:
-        """The cut at a grazing, or where a release or a closing of one of several contacts appears or is lost."""
+        """Where a step is cut: at a grazing, or where a release or a closing of one of several contacts appears or is lost."""
         if self.last_cut is None or self.last_cut[0] is not point or self.last_cut[1] is not ahead:
             self.last_cut = point, ahead, self._cut(point, ahead)
         return self.last_cut[2]
@@ -137,7 +138,8 @@ class BranchEvents(OrbitEvents):
         return found
 
     def interrupted(self, run: Run, point: OrbitPoint, ahead: OrbitPoint) -> End | None:
-        """The end at the orbit's own image, on the branch from which its family is born, at its BPC or PD."""
+        """The end of a family that reaches orbits that are their own images: at the BPC or PD of the parent's branch at which the
+        family is born."""
         if not passes_image(point, ahead):
             return None
         kind = SpecialKind.BPC if point.orbit.period % 2 else SpecialKind.PD
@@ -145,7 +147,7 @@ class BranchEvents(OrbitEvents):
         if parent is not None:
             last = on_family(point, parent.point)
             beside = None if last is None else beside_image(point, last)
-            if beside is not None:  # on the way to it the family may have further special points
+            if beside is not None:  # between the last point and the end the family may have further special points
                 run.take(beside)
             run.points.append(last or parent.point)
             run.special.append(parent)
@@ -156,12 +158,12 @@ class BranchEvents(OrbitEvents):
         return branch_tests(point, self.functions)
 
     def outside(self, point: OrbitPoint) -> int | None:
-        """How many multipliers are outside the unit circle; None at a grazing."""
+        """The number of multipliers outside the unit circle; None at a grazing."""
         return None if point.orbit.grazes else int(np.count_nonzero(np.abs(point.orbit.multipliers) > 1.0 + SETTINGS.on_circle))
 
     def distinct(self, found: list[Zero]) -> list[Zero]:
-        """Special points without the crossings of branches that are folds, and without tori of real multipliers or where areas
-        never grow."""
+        """The special points, without crossings of branches that are only folds, and without the zeros of `torus` that real
+        multipliers make or that lie where areas of states never grow."""
         folds = [zero.parameter for zero in found if zero.kind == SpecialKind.LP]
 
         def is_fold(zero: Zero) -> bool:
@@ -187,7 +189,7 @@ class BranchEvents(OrbitEvents):
         return super().ended(run, ahead, cut)
 
     def across(self, run: Run, cut: Cut) -> OrbitPoint | End:
-        """The point with the signature on the other side of a grazing, or why the branch does not go on."""
+        """The point with the signature of the other side of a grazing, at which the branch goes on; or why it ends."""
         graze = cut.special
         if graze is not None and any(_same_place(graze, earlier) for earlier in run.special[:-1]):
             run.special.pop()
@@ -212,9 +214,9 @@ class BranchEvents(OrbitEvents):
         return first_step(*points[-2:]) if isinstance(points[-1].orbit.problem, FollowedProblem) else math.inf
 
     def stalled(self, run: Run, point: OrbitPoint, step: float) -> Cut | End:
-        """The end where even the shortest step fails: the orbit repels too strongly, or the reason is not known.
+        """The end where even the shortest step fails: because the orbit repels too strongly, or for a reason that is not known.
 
-        Where the events change that an orbit is followed through the branch may turn round.
+        An orbit that is followed through its events may stall where these change; there the branch may turn round: a cut.
         """
         if isinstance(point.orbit.problem, FollowedProblem):
             if (end := refused_beyond(point, step, run.bounds)) is not None:
@@ -230,11 +232,12 @@ class BranchEvents(OrbitEvents):
 
 
 def _parent_at(run: Run, cut: Cut) -> SpecialPoint | None:
-    """The special point of its parent at which a family ends where events change: there multipliers jump, see `jump_over`."""
+    """The special point of the parent's branch if a family ends there at a change of events, at which multipliers jump (see
+    `jump_over`); else None."""
     near, point = TOLERANCES.grazing_orbits, cut.point
     if cut.special is None or all(is_image(known, near) for known in run.points):
         return None
-    way = cut.special.evidence.bracket / max(abs(point.tangent[-1]), TINY)  # to the change itself, if it was not reached
+    way = cut.special.evidence.bracket / max(abs(point.tangent[-1]), TINY)  # how far the change itself may still be
     parent = parent_of(point, max(near, way * float(np.abs(point.tangent[:-1]).max())))
     if parent is None:
         return None
@@ -242,14 +245,15 @@ def _parent_at(run: Run, cut: Cut) -> SpecialPoint | None:
 
 
 def _impact_count(point: OrbitPoint) -> int:
-    """Impacts in one period, but for those that die away."""
+    """The number of impacts in one period, without those of accumulations."""
     return (
         events_at(point).impact_count if isinstance(point.curve.problem, FollowedProblem) else point.orbit.signature.impact_count
     )
 
 
 def _accumulate(run: Run, following: OrbitPoint) -> bool:
-    """Whether the last grazings have all added impacts, ever closer to one parameter or on the way to rest."""
+    """Whether grazings accumulate: the last ones have all added impacts, close to one value of the parameter or on the way to
+    rest."""
     grazings = [s.point for s in run.special if s.kind == SpecialKind.GR][-SETTINGS.accumulating :]
     counts = [_impact_count(point) for point in (*grazings, following)]
     if len(grazings) < SETTINGS.accumulating or not (np.diff(counts) > 0).all():
@@ -270,9 +274,10 @@ def _same_place(a: Zero, b: Zero) -> bool:
 
 
 def parent_point(a: OrbitPoint, b: OrbitPoint) -> Zero | None:
-    """The special point at which a family was born that passes through an orbit that is its own image, on the parent's branch.
+    """The special point of the parent's branch at which a family is born, from a step a-b of the family that passes through it.
 
-    There the family's own equations are singular; those of the parent, over half of the period, are not.
+    The orbit there is its own image. The family's equations are singular at it; those of the parent, over half of the period, are
+    not.
     """
     problem, first, last = a.curve.problem.halved, halves(a), halves(b)
     assert first is not None

@@ -1,4 +1,4 @@
-"""Codimension-two points: where something more happens along a curve of special points."""
+"""Codimension-two points: special points along a curve of special points, at which a second condition holds."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def curve_test(kind: SpecialKind, value: Callable[[SpecialCurvePoint], float]) -
 def curve_tests(kind: str, symmetric: bool) -> list[TestFunction]:
     """The test functions along a curve of a kind, by the codimension-two point at which each vanishes.
 
-    Beside a grazing the trace of the multipliers' matrix of the orbits with more impacts is (a number) / v. Where that number
-    vanishes, both a multiplier +1 and one -1 come as near to the grazing as one likes.
+    Beside a grazing, the monodromy matrix of the orbits with the additional impacts has a trace proportional to 1 / v, where v is
+    their speed. Where the factor vanishes, both orbits with a multiplier +1 and with one -1 lie arbitrarily near to the grazing.
     """
     if kind == SpecialKind.LP:
         return [curve_test(SpecialKind.CP, lambda point: quadratic(point.condition_value))]
@@ -43,16 +43,16 @@ def curve_tests(kind: str, symmetric: bool) -> list[TestFunction]:
 
 
 def normal_form(point: SpecialCurvePoint) -> float:
-    """The cubic coefficient of a PD or BPC."""
+    """The cubic coefficient of the normal form of a PD or BPC."""
     condition = point.condition
     assert isinstance(condition, Singular)
     return cubic(condition, point.solution, point.condition_value)
 
 
 def room(point: SpecialCurvePoint) -> float:
-    """How far the motion is from another grazing: the least speed of an impact and inner minimum of the gap, at most `CAP`.
+    """How far the motion is from another grazing: the least of the impacts' speeds and of the gap's minima, at most `CAP`.
 
-    Those of the grazing that the curve itself consists of are left out.
+    The impacts and the minimum of the grazing that the curve itself follows are left out.
     """
     orbit, touching = point.orbit, point.touching
     n = len(orbit.signature.sides)
@@ -67,9 +67,9 @@ def room(point: SpecialCurvePoint) -> float:
 
 
 def without(point: SpecialCurvePoint, closing: float) -> float:
-    """The determinant of the equations of perturbations for the orbit on the other side of the grazing, 1 if there is none.
+    """The determinant of the equations for perturbations of the orbit on the other side of the grazing; 1 if there is none.
 
-    That is the orbit without the impacts that have no speed; perturbations return as they were, or with the other sign.
+    That orbit lacks the impacts that have no speed. Perturbations return as they were (closing +1) or with the other sign (-1).
     """
     other = removed(point)
     equations = None if isinstance(other, End) else other[0].evaluate(other[1], point.solution.values)

@@ -1,12 +1,13 @@
-"""The equation more that singles out special orbits along curves in two parameters, and its derivatives.
+"""The additional equation that holds at special orbits only, along curves in two parameters, and its derivatives.
 
-With the orbit's equations F(y, p) = 0 (`problem.py`, J their derivatives to the unknowns y) it is one of
+With the orbit's equations F(y, p) = 0 (`problem.py`; J is the matrix of their derivatives to the unknowns y) it is one of
 
     fold LP:  g = 0 of  [[J, b], [c^T, 0]] (u, g) = (0, 1),         grazing GR:  v_i = 0;
 
-period doubling PD, and symmetry breaking BPC with the half map, as LP, with J of perturbations that change their sign each time.
-b and c are fixed near the null vectors, so the left vector d of the transposed system gives dg = -d^T (dJ) u. Central differences
-along u give (dJ) u, of motions that begin at y + s u and end a period later at y + s u, or, for PD and BPC, at y - s u.
+Period doubling PD, and symmetry breaking BPC over half a period, have the equation of LP with the J of perturbations that change
+their sign each (half) period. b and c are fixed near the null vectors of J; then dg = -d^T (dJ) u, where d solves the transposed
+system. Central differences along u give (dJ) u: of motions that begin at y + s u and end a period later at y + s u or, for PD and
+BPC, at y - s u.
 """
 
 from __future__ import annotations
@@ -27,9 +28,9 @@ class DifferenceSettings:
 
     shift: float = 1e-4  # step of second derivatives: their error is its square plus rounding divided by it
     long_shift: float = 4e-3  # step of third differences: their error is its fourth power plus rounding divided by its cube
-    # The largest second-order part of a step of third differences, which are taken over shorter steps where it would be more.
-    # With eight times as much they change their sign where the coefficient does not, and with phases of impacts moved by 20 rad
-    # the motions took 500 times as long to follow.
+    # The largest second-order part of a step of third differences; steps with a larger one are shortened. With eight times as
+    # much the differences change their sign where the coefficient does not; and where that part moved phases of impacts by 20
+    # rad, the motions took 500 times as long to follow.
     farthest: float = 5e-3
 
 
@@ -48,7 +49,8 @@ class ConditionValue:
 
 @dataclass(frozen=True, eq=False)
 class Singular:
-    """Perturbations that return after the period of the equations: as they were (closing +1), or with the other sign (-1)."""
+    """The condition that a perturbation returns after the period of the equations: as it was (closing +1), or with the other sign
+    (-1)."""
 
     problem: Problem
     closing: float
@@ -85,7 +87,7 @@ class Singular:
         return ConditionValue(float(right[n]), -left[:n] @ bend, right[:n], left[:n])
 
     def curvature(self, solution: Solution, vector: np.ndarray) -> np.ndarray | None:
-        """The second derivative of the equations along a perturbation of length 1 that returns as the condition asks."""
+        """The second derivative of the equations along a perturbation of length 1, which returns as `closing` says."""
         beside = self.beside(solution, SETTINGS.shift * vector)
         if beside is None:
             return None
@@ -93,7 +95,7 @@ class Singular:
         return np.asarray((ahead - behind) / (2.0 * SETTINGS.shift))
 
     def beside(self, solution: Solution, shift: np.ndarray) -> tuple[Equations, Equations] | None:
-        """The equations of motions beside an orbit, by +shift and by -shift, which return shifted as the condition asks."""
+        """The equations of two motions that begin at +shift and -shift from an orbit, and return shifted as `closing` says."""
         both = (solution.unknowns + shift, solution.unknowns - shift)
         ends = both if self.closing > 0 else both[::-1]
         ahead, behind = (self.problem.evaluate(y, solution.values, later=end) for y, end in zip(both, ends, strict=True))
@@ -102,13 +104,13 @@ class Singular:
 
 @dataclass(frozen=True, eq=False)
 class Slow:
-    """An impact without speed: that which the signature on the other side of a grazing has more."""
+    """The condition that impact `index` has no speed: a grazing, in the signature that has this impact."""
 
     problem: Problem
     index: int
 
     def moved(self, at: ConditionValue) -> Slow:
-        """The condition as seen from another point: the same."""
+        """The condition does not depend on the point."""
         return self
 
     def evaluate(self, solution: Solution) -> ConditionValue:
@@ -122,17 +124,17 @@ Condition = Singular | Slow
 
 
 def quadratic(at: ConditionValue) -> float:
-    """d^T F_yy u u at a fold, where it folds the branch; 0 at a cusp. LP only."""
+    """The quadratic coefficient d^T F_yy u u of a fold (LP only); 0 at a cusp."""
     return -float(at.gradient[: at.right.size] @ at.right)
 
 
 def cubic(condition: Singular, solution: Solution, at: ConditionValue) -> float:
     """The coefficient of a^3 in the equation of the amplitude a of the orbits born at a PD or BPC, with d scaled to unit length.
 
-    They lie on the other side of the parameter where it changes its sign (GPD, DBPC). Perturbed by +-a u + a^2 h / 2, J h =
-    -F_yy u u, over two (half) periods in turn, the part of the equations along +-d is odd in a: here its third difference,
-    refined once. NaN where J is singular, or so nearly that h says nothing of motions beside this one, or where the motion is so
-    near to another kind that it cannot be followed when it is perturbed.
+    Its sign says on which side of the PD or BPC these orbits lie; it changes at a GPD or DBPC. The orbit is perturbed by
+    +-a u + a^2 h / 2 over two (half) periods in turn, where J h = -F_yy u u. The component of the equations along +-d is then odd
+    in a, and its third difference, extrapolated once, is the coefficient. NaN where J is singular or nearly so, which makes h too
+    large for an expansion, or where a perturbed motion has another signature and cannot be followed.
     """
     u, d = (x / np.linalg.norm(x) for x in (at.right, at.left))
     curvature = condition.curvature(solution, u)

@@ -1,10 +1,11 @@
 """The boundary-value problem of a periodic orbit with several contacts, and its derivatives.
 
-Its events are impacts of single contacts and releases. Unknowns are the state just after the first event, without the
-coordinates that are then held, and the phase of every event; equations are that each event's guard, the gap or the reaction, is 0
-at its phase, and that the state a period later, after the first event again, is the one of the start. Between events the contacts
-that are closed are those of the signature, whatever the signs of gaps and reactions. An orbit without events has the free
-coordinates and velocities at phase 0 as its unknowns. A symmetric orbit is closed after half a period by its mirror image.
+Its events are impacts of single contacts and releases. The unknowns are the state just after the first event, without the
+coordinates that contacts then hold, and the phase of every event. The equations say that each event's guard (the gap of an
+impact, the reaction of a release) is 0 at its phase, and that the state after the first event of the next period is the one of
+the start. Between events the signature says which contacts are closed, whatever the signs of gaps and reactions. An orbit without
+events has the free coordinates and velocities at phase 0 as its unknowns. A symmetric orbit is closed after half a period by its
+mirror image.
 """
 
 from __future__ import annotations
@@ -24,22 +25,22 @@ from saltus.orbits.tolerances import TOLERANCES
 from saltus.systems import System, image_of
 from saltus.taylor import FREQUENCY
 
-AFTER_RELEASE, AFTER_IMPACT = 3, 2  # powers of the time with which a contact opens from rest
-START_SHARE = 0.4  # share of a segment at which a motion is started: in the middle an orbit may touch, by symmetry
+AFTER_RELEASE, AFTER_IMPACT = 3, 2  # power of the time with which the gap grows after a release, and after an impact with e = 0
+START_SHARE = 0.4  # where in a segment a motion is started; not in its middle, where symmetric orbits may touch a contact
 
 
 @dataclass(frozen=True)
 class ContactEquations(Equations):
-    """The problem at one point. Its derivatives are `here`, to the unknowns, and `there`, to those at the end of the period."""
+    """The problem at one point; its derivatives are `here`, to the unknowns, and `there`, to the unknowns a period later."""
 
-    seen: np.ndarray  # (n, ...): what is seen along each segment, by `SegmentExtremes`; empty if not asked for
-    state_count: int  # of the unknowns those that are a state
+    seen: np.ndarray  # (n, ...): the extremes along each segment, in the columns of `SegmentExtremes`; empty if not asked for
+    state_count: int  # how many of the unknowns are the state; the others are phases
 
     def _fill(self, matrix: np.ndarray, closing: float) -> None:
         matrix[:, : len(matrix)] = self.here + closing * self.there
 
     def monodromy(self) -> np.ndarray:
-        """The map of the state after the first event, and of its phase, to those a period later; inf at a grazing."""
+        """The derivative of the map of the first event's phase, and the state after it, over a period; inf at a grazing."""
         count = self.state_count
         state = [*range(count + 1)] if self.here.shape[0] > count else [*range(count)]
         later = [*range(count + 1, self.here.shape[0])]
@@ -60,7 +61,7 @@ class ContactProblem(Problem):
 
     @cached_property
     def plan(self) -> np.ndarray:
-        """The segments, see `SegmentPlan`: each begins with an event and ends with the next one, the last one with the first."""
+        """The segments (see `SegmentPlan`): from each event to the next one, the last event's to the first of the next period."""
         events = self.signature.events
         if not events:
             return no_event(self.signature.closed)
@@ -72,7 +73,8 @@ class ContactProblem(Problem):
         return np.array(rows, dtype=np.int64)
 
     def _power(self, begin: ModeChange, end: ModeChange) -> int:
-        """With which power of the time a contact opens that a segment begins and ends at, if it does so from rest; else 0."""
+        """The power of the time with which a contact opens, of a segment that begins with an event of this contact without speed
+        afterwards and ends with an impact on it; else 0."""
         if begin.contact != end.contact or not end.is_impact:
             return 0
         if not begin.is_impact:
@@ -91,13 +93,13 @@ class ContactProblem(Problem):
         return len(self._free) + len(self.signature.events)
 
     def split(self, unknowns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The state at the start, with 0 for what is held, and the phases of the events."""
+        """The state at the start, with 0 for coordinates and velocities that are held, and the phases of the events."""
         state = np.zeros(2 * self.own)
         state[self._free] = unknowns[: len(self._free)]
         return state, unknowns[len(self._free) :]
 
     def joined(self, state: np.ndarray, phases: np.ndarray) -> np.ndarray:
-        """The unknowns of a state just after the first event, or at phase 0, and of the events' phases."""
+        """The unknowns made of a state (just after the first event, or at phase 0) and the events' phases."""
         return np.append(state[self._free], phases)
 
     def repeated(self, unknowns: np.ndarray) -> np.ndarray:
@@ -116,7 +118,7 @@ class ContactProblem(Problem):
         return float((-equations.ends[rows, SegmentEnd.RATE]).min(initial=math.inf))
 
     def pressing(self, unknowns: np.ndarray, equations: Equations) -> float:
-        """The least of the reactions between closing and release, of the times between events, and of other gaps at impacts."""
+        """The least of the reactions of closed contacts, the times between events, and the gaps of other contacts at impacts."""
         assert isinstance(equations, ContactEquations)
         phases = self.split(unknowns)[1]
         apart = np.diff(np.append(phases, phases[:1] + self.closing))
@@ -136,7 +138,7 @@ class ContactProblem(Problem):
         return None if followed is None else self._assembled(end, times, frequency, *followed)
 
     def carried_along(self, state: np.ndarray, closed: int, times: np.ndarray, values: np.ndarray) -> np.ndarray | None:
-        """The state at the second time of the smooth motion from a state at the first one, with these contacts closed."""
+        """The state at the second of two times, of the smooth motion from a state at the first, with these contacts closed."""
         followed = self._followed(no_event(closed), times, state, values, False)
         begin = SegmentEnd.NUMBERS + 4 * self.own
         return None if followed is None else np.asarray(followed[0][0, begin : begin + 2 * self.own])
@@ -144,7 +146,7 @@ class ContactProblem(Problem):
     def _followed(
         self, plan: np.ndarray, times: np.ndarray, state: np.ndarray, values: np.ndarray, with_extremes: bool
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
-        """What `follow_contact_segments` fills; None where a segment cannot be followed."""
+        """The arrays that `follow_contact_segments` fills; None where a segment cannot be followed."""
         parameters = self._values.copy()
         parameters[self._places] = values
         env, model = self._run.structure.prepare(parameters, self._records)
@@ -169,9 +171,9 @@ class ContactProblem(Problem):
         maps: np.ndarray,
         seen: np.ndarray,
     ) -> ContactEquations:
-        """Residual, with the state `end` at the end, and derivatives, by the chain rule from segment to segment.
+        """The residual and its derivatives, by the chain rule from segment to segment; `end` is the state asked for at the end.
 
-        The columns are the state at the start, the phases, the phase of the first event a period later, and the parameters.
+        Columns are the state at the start, the phases, the phase of the first event a period later, and the parameters.
         """
         own, free, events = self.own, self._free, len(self.signature.events)
         first, count = len(free), len(self.paths)
@@ -209,7 +211,7 @@ class ContactProblem(Problem):
         return ContactEquations(residual, here, there, total[:, parameters:], ends, self._extremes(seen), seen, first)
 
     def _extremes(self, seen: np.ndarray) -> np.ndarray:
-        """What is seen along the segments in the places of the other orbits'."""
+        """The extremes along the segments, in the columns that orbits with one contact use (`flow/segments.py`)."""
         extremes = np.full((len(seen), at.LEAST_MARGIN + max(1, len(self.margins))), np.inf)
         extremes[:, [at.TOP, at.BOTTOM]] = seen[:, [SegmentExtremes.TOP, SegmentExtremes.BOTTOM]]
         extremes[:, [at.HUMP, at.HUMP_TIME]] = seen[:, [SegmentExtremes.GAP, SegmentExtremes.GAP + 1]]
@@ -218,7 +220,7 @@ class ContactProblem(Problem):
         return extremes
 
     def within(self, unknowns: np.ndarray, equations: Equations, values: np.ndarray) -> tuple[np.ndarray, float]:
-        """A state within the longest segment, and its time; of an orbit without events that at phase 0."""
+        """A state within the longest segment, and its time; for an orbit without events, the state at phase 0."""
         state, phases = self.split(unknowns)
         if not phases.size:
             return self._with_held(state, self.signature.closed, values), 0.0
@@ -231,7 +233,8 @@ class ContactProblem(Problem):
         return there, float(part[1])
 
     def halves(self, unknowns: np.ndarray, equations: Equations) -> np.ndarray | None:
-        """The unknowns of both halves of a period, each as of the equations of one, (2, n); None where their events differ."""
+        """The unknowns of both halves of a period, each as unknowns of the equations over one half, (2, n); None where the events
+        of the halves differ."""
         events, half = self.signature.events, len(self.signature.events) // 2
         odd, own = self.signature.period % 2, self.own
         image = tuple(event.image(self.images) for event in events[:half]) if odd else events[:half]
@@ -245,7 +248,7 @@ class ContactProblem(Problem):
         return np.stack([first, second])
 
     def _with_held(self, state: np.ndarray, closed: int, values: np.ndarray) -> np.ndarray:
-        """A state at rest at the contacts that are closed, and at those that it touches without speed but for rounding."""
+        """A state put exactly onto the contacts that are closed, and onto those that it touches without speed, up to rounding."""
         for i, contact in enumerate(self.at(values).model.contacts):
             pair = [self._run.trace.held[i], self.own + self._run.trace.held[i]]
             if closed >> i & 1 or max(abs(contact.gap(state[pair[0]])), abs(state[pair[1]])) < TOLERANCES.touch:
@@ -264,6 +267,6 @@ def no_event(closed: int) -> np.ndarray:
 
 
 def problem_of(system: System, signature: Signature, paths: tuple[str, ...] = (), tol: float = ORBIT_TOLERANCE) -> Problem:
-    """The problem of a signature of a system: with one contact or several, or of what is followed as a whole motion."""
+    """The problem of a signature: with one contact, with several, or, if the signature has a section, followed as one motion."""
     kind: type[Problem] = ContactProblem if system.model.held else Problem
     return (kind if signature.section is None else FollowedProblem)(system, signature, paths, tol)

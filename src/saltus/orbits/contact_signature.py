@@ -1,4 +1,4 @@
-"""The signature of a motion with several contacts, and the orbit with it."""
+"""The signature of a motion with several contacts, and the orbit that has this signature."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from saltus.orbits.signature import ModeChange, Signature
 
 @dataclass(frozen=True)
 class ReadingSettings:
-    """How the events of a motion become a signature."""
+    """How a signature is read from the events of a motion."""
 
     together: float = 1e-9  # Events nearer to each other than this share of a forcing period happen at one instant.
     tol: float = 1e-13  # Tolerance of the motion that is read: Newton's method begins from it.
@@ -33,7 +33,7 @@ def solved_from(base: Problem, state: dict[str, Any], periods: int, iterations: 
     Raises
     ------
     MotionError
-        A motion that stays at its contacts for good, or whose events have no equations yet.
+        The motion stays at its contacts for good, or has events for which orbits have no equations yet.
     """
     motion = simulate(base.system, **state, periods=2 * periods, tol=SETTINGS.tol)
     if motion.limit is not None:
@@ -47,12 +47,14 @@ def solved_from(base: Problem, state: dict[str, Any], periods: int, iterations: 
 
 
 def _is_followed(base: Problem, motion: Motion) -> bool:
-    """Whether the orbit is followed through its events, as equations between them lack: with frictions, or dying impacts."""
+    """Whether the orbit is followed through its events, because there are no equations from event to event for it: with
+    frictions, or with accumulations of impacts."""
     return bool(base.system.model.frictions) or len(motion.events.of(EventKind.HELD)) > 0
 
 
 def _followed(base: Problem, motion: Motion, periods: int) -> tuple[Problem, np.ndarray]:
-    """The equations x = Phi(x) at a section of a motion that was followed for twice its `periods`, and the state there."""
+    """The problem x = Phi(x) over `periods` forcing periods, with a section chosen along a motion, and the motion's state
+    there."""
     period = base.system.load.period
     assert period is not None
     within = (motion.start < motion.events.times) & (motion.events.times < motion.start + periods * period)
@@ -65,10 +67,10 @@ def _followed(base: Problem, motion: Motion, periods: int) -> tuple[Problem, np.
 def section_of(
     motion: Motion, frequency: float, phase: float | None = None, duration: float | None = None
 ) -> tuple[float, np.ndarray]:
-    """The phase farthest from all events at which not all coordinates are held, within the first `duration` of a motion, and the
-    state there; or the state at a phase that is given.
+    """The phase and the state of a motion at a section: the middle of its longest smooth stretch within the first `duration` in
+    which not all coordinates are held; or the state at a phase that is given.
 
-    The shorter the time between the events about it, the sooner one of them comes to it along a branch.
+    The longer that stretch, the longer a branch can be followed before an event comes to the section.
     """
     assert motion.dense is not None
     end = motion.time if duration is None else motion.start + duration
@@ -86,9 +88,9 @@ def section_of(
 
 
 def read_signature(base: Problem, motion: Motion, periods: int) -> tuple[ContactProblem, np.ndarray]:
-    """The problem with the signature of a motion that was followed for twice its `periods`, and its unknowns along the motion.
+    """The problem with the signature of a motion, and its unknowns along the motion, which was followed for twice `periods`.
 
-    The events are those of a stretch of `periods` that begins in the middle between two events.
+    The events are those of a span of `periods` forcing periods that begins in the middle between two events.
     """
     period = base.system.load.period
     assert period is not None
@@ -111,20 +113,20 @@ def read_signature(base: Problem, motion: Motion, periods: int) -> tuple[Contact
 
 
 def _mode_changes(base: Problem, motion: Motion, together: float) -> list[tuple[float, ModeChange]]:
-    """The events at which the contacts change, each with its time and the contacts that are closed after it.
+    """The events at which contacts open or close, each with its time and the contacts that are closed after it.
 
-    What happens at one instant to contacts of different groups, such as cells of a chain that move alike, are events in a row:
-    their impulses do not act on one another, so that the order makes no difference.
+    Contacts of different groups, such as the cells of a chain that move alike, may act at one instant. These count as events one
+    after the other, in any order, as their impulses do not act on one another.
 
     Raises
     ------
     MotionError
-        Events for which orbits have no equations.
+        There are events for which orbits have no equations.
     """
     changes: list[tuple[float, ModeChange]] = []
     for time, acting in _instants(base, motion, together):
         closed = int(motion.closed_at(time))
-        for contact, is_impact in acting.items():  # those whose turn comes later are as they were
+        for contact, is_impact in acting.items():  # before the first of these events all their contacts are as they were
             closed = closed & ~(1 << contact) if is_impact else closed | 1 << contact
         after = int(motion.closed_at(time))
         for contact, is_impact in acting.items():
@@ -134,7 +136,7 @@ def _mode_changes(base: Problem, motion: Motion, together: float) -> list[tuple[
 
 
 def _instants(base: Problem, motion: Motion, together: float) -> list[tuple[float, dict[int, bool]]]:
-    """The instants at which contacts change: which of them, and whether each is hit, or let go."""
+    """The instants at which contacts act: for each of them the contacts, and whether it is an impact (else a release)."""
     contacts = base.system.model.contacts
     names, instants = [contact.name for contact in contacts], list[tuple[float, dict[int, bool]]]()
     events: Sequence[Any] = motion.events

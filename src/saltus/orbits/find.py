@@ -1,4 +1,4 @@
-"""Finding a periodic orbit from a state: let the motion settle, read its signature, solve the equations."""
+"""Finding a periodic orbit from a state: the motion settles, its signature is read, and the equations are solved."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class FindOrbitSettings:
     """How long a motion is followed until it settles, and how its orbit is solved for."""
 
     max_period: int = 12  # The longest period that is looked for if no limit is given, in forcing periods.
-    # Number of forcing periods that a motion is given to settle in the first round; each further round doubles it.
+    # Number of forcing periods for which a motion is followed in the first round to settle; each further round doubles it.
     settling: int = 160
     rounds: int = 5  # Number of such rounds.
     iterations: int = 25  # The largest number of Newton's iterations from a motion to its orbit.
@@ -56,9 +56,9 @@ def find_orbit(
     parameters: tuple[str, ...] = (),
     **coordinates: float,
 ) -> PeriodicOrbit:
-    """The periodic orbit that a motion settles on, or, with settle=0, the one that lies near it, stable or not.
+    """The periodic orbit on which a motion settles, or, with settle=0, the one that lies near it, stable or not.
 
-    Where impacts have a loss and the load pulls the system off its contact in every period, that may be a `RestingOrbit`.
+    Where impacts have a loss and the load pulls the system off its contact in every period, the orbit may be a `RestingOrbit`.
 
     Parameters
     ----------
@@ -67,21 +67,21 @@ def find_orbit(
     velocity, coordinates
         The state at phase 0, by the model's names: theta=0.3.
     period
-        How many forcing periods the orbit takes; by default the fewest, up to `max_period`, after which the motion
+        The period of the orbit in forcing periods; by default the shortest one, up to `max_period`, after which the motion
         returns.
     settle
-        Forcing periods to let pass first; by default as many as it takes, up to 4960.
+        How many forcing periods the motion is followed first; by default until it has settled, up to 4960.
     max_period
-        The longest period looked for.
+        The longest period that is looked for.
     parameters
-        Dotted paths along which the orbit will be continued; `continue_orbit` sees to them itself.
+        Dotted paths along which the orbit will be continued; not needed for `continue_orbit`, which adds its own.
 
     Raises
     ------
     ParameterError
-        An argument without meaning.
+        An argument has no meaning.
     MotionError
-        The motion comes to rest for good, does not settle, or Newton's method does not converge; with what to do.
+        The motion comes to rest for good, does not settle, or Newton's method does not converge; the message says what to do.
 
     Examples
     --------
@@ -89,7 +89,7 @@ def find_orbit(
     2
     """
     _check(system, parameters, coordinates, {"period": period, "max_period": max_period, "settle": settle})
-    base = problem_of(system, Signature((), 1), tuple(parameters))  # refuses what has no orbits
+    base = problem_of(system, Signature((), 1), tuple(parameters))  # refuses systems that have no orbits
     state = {**coordinates, "velocity": velocity}
     if settle is not None:
         state = _after(system, state, settle)
@@ -124,14 +124,14 @@ def _check(system: System, parameters: Iterable[str], coordinates: Mapping[str, 
 
 
 def _after(system: System, state: dict[str, Any], periods: int) -> dict[str, Any]:
-    """The state so many forcing periods later."""
+    """The state `periods` forcing periods later."""
     motion = simulate(system, **state, periods=periods, dense=False)
     _refuse_rest(system, motion, state)
     return _state_of(system, motion)
 
 
 def _refuse_rest(system: System, motion: Motion, state: dict[str, Any]) -> None:
-    """Refuse a motion that stays at the contact for good, or has lost its phase there, or that a margin ends."""
+    """Refuse a motion that stays at the contact for good, that has lost its phase there, or that ends at a margin."""
     if motion.limit is not None:
         raise MotionError(f"the motion ends at time {motion.time:.6g}, where its margin {motion.limit} reaches 0: no orbit there")
     if motion.side != 0 and motion.phase_known:
@@ -202,7 +202,8 @@ def _polish(base: Problem, state: dict[str, Any], periods: int, passed: int | No
 
 
 def orbit_from(base: Problem, state: dict[str, Any], periods: int) -> PeriodicOrbit | None:
-    """The orbit near a motion over `periods` forcing periods from a state at phase 0, one that rests for a part of them too."""
+    """The orbit near a motion over `periods` forcing periods from a state at phase 0; it may be one that rests for a part of
+    them."""
     orbit = orbit_near(base, state, periods)
     if (orbit is not None and orbit.admissible) or base.system.model.held:
         return orbit
@@ -228,7 +229,7 @@ def guess(base: Problem, motion: Motion, state: np.ndarray, periods: int) -> tup
     if base.passes_contact:
         return base.with_signature(Signature((), periods)), state
     impacts = motion.impacts
-    # with two sides an odd impact is one near the section that was counted once too often, or not at all
+    # with two sides the number of impacts is even: an impact near the section may have been counted twice, or not at all
     count = len(impacts) - (len(impacts) % 2 if len(base.system.model.sides) == 2 else 0)
     if not count:
         return base.with_signature(Signature((), periods, False, motion.side)), state
@@ -239,7 +240,7 @@ def guess(base: Problem, motion: Motion, state: np.ndarray, periods: int) -> tup
 
 
 def simplest(orbit: PeriodicOrbit) -> PeriodicOrbit:
-    """An orbit by its least period and, where it is its own mirror image, by half of it."""
+    """An orbit as a solution over its least period or, where it is its own mirror image, over half of that."""
     orbit = divide(orbit) or orbit
     return (half(orbit) if _is_symmetric(orbit.problem) else None) or orbit
 
@@ -250,7 +251,7 @@ def _is_symmetric(problem: Problem) -> bool:
 
 
 def divide(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
-    """An orbit that repeats after a divisor of its period, as an orbit of that; None where it does not."""
+    """An orbit that repeats after a divisor of its period, as an orbit of this shorter period; None for other orbits."""
     signature, unknowns = orbit.signature, orbit.solution.unknowns
     changes = signature.sides or signature.events
     n = len(changes)

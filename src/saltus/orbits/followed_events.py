@@ -1,4 +1,4 @@
-"""What happens along an orbit that is followed through its events: in which order, and how near that is to being another one."""
+"""The events of an orbit that is followed through them: their order, and how near the orbit is to having other events."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ CHANGES = (
 
 @dataclass(frozen=True)
 class EventSettings:
-    """Which impacts die away, and when a section has to be moved."""
+    """Which impacts belong to an accumulation, and when a section has to be moved."""
 
-    grows: float = 1e-6  # Share by which an impact is faster than the one before if they have not begun to die away.
-    # The section is moved where it is nearer to an event than this share of the time between the events before and after it.
+    grows: float = 1e-6  # Impacts have not begun to die away if one is faster than its predecessor by more than this share.
+    # The section is moved if it is nearer to an event than this share of the time between the events before and after it.
     section_distance: float = 0.02
-    farthest: float = 1.0  # The largest distance that is told: it would be infinite for an orbit that never turns.
+    farthest: float = 1.0  # The largest distance that is given: it would be infinite for an orbit without any minimum.
 
 
 SETTINGS = EventSettings()
@@ -47,7 +47,7 @@ class OrbitEvent(NamedTuple):
 
 
 class Group(NamedTuple):
-    """Contacts and frictions that act on one another, as bits of an event's parts, and as bits of its mode less 1."""
+    """Contacts and frictions that act on one another: their bits in an event's `parts`, and in its `mode` less 1."""
 
     parts: int
     modes: int
@@ -55,19 +55,20 @@ class Group(NamedTuple):
 
 @dataclass(frozen=True)
 class FollowedEvents:
-    """The events of an orbit from its section on, and how near they are to others."""
+    """The events of an orbit from its section on, and how near it is to an orbit with other events."""
 
     events: tuple[OrbitEvent, ...]
     times: tuple[float, ...]
     period: float
-    distance: float  # the least of gaps, speeds, reactions and durations that are 0 where an event appears or is lost
+    distance: float  # the least of the gaps, speeds, reactions and durations that become 0 where an event appears or is lost
     section_distance: float  # where the section lies between its neighbouring events: 0 on one of them, 1/2 in the middle
 
-    groups: tuple[Group, ...]  # what acts on one another
+    groups: tuple[Group, ...]  # the groups of contacts and frictions
 
     @property
     def sequence(self) -> tuple[OrbitEvent, ...]:
-        """The events of each group from the same one on wherever the section lies; those of others do not matter to it."""
+        """The events of one group after the other, each begun with the same event wherever the section lies, so that the
+        sequences of two orbits can be compared. The order of events of different groups makes no difference and is left out."""
         found: tuple[OrbitEvent, ...] = ()
         for parts, modes in self.groups:
             events = tuple(event._replace(mode=event.mode - 1 & modes) for event in self.events if event.parts & parts)
@@ -76,11 +77,12 @@ class FollowedEvents:
 
     @property
     def impact_count(self) -> int:
-        """How many impacts there are, but for those that die away."""
+        """The number of impacts, without those of accumulations."""
         return sum(event.kind == EventCode.IMPACT for event in self.events)
 
     def until_next(self, kinds: tuple[int, int]) -> float:
-        """The least time from an event of the first kind to the next event, of the same parts, if that is of the second kind."""
+        """The least time between two successive events of one contact or friction that are of these two kinds; inf without
+        such."""
         n, least = len(self.events), math.inf
         for i, event in enumerate(self.events):
             later = next(j for j in range(i + 1, i + n + 1) if self.events[j % n].parts & event.parts)
@@ -90,8 +92,10 @@ class FollowedEvents:
 
 
 def events_of(motion: Motion, sampled: SampledMotion, images: Sequence[int] | None = None) -> FollowedEvents:
-    """The events of one period of an orbit, which begins at its section; with the number of the image of each contact and
-    friction, of one that is its own mirror image after the motion.
+    """The events of one period of an orbit, whose motion begins at its section.
+
+    With `images`, the number of the mirror image of each contact and friction, the motion is half a period of a symmetric orbit:
+    the images of its events follow.
     """
     period = motion.time - motion.start
     listed, when, all_speeds = _listed(motion)
@@ -111,7 +115,7 @@ def events_of(motion: Motion, sampled: SampledMotion, images: Sequence[int] | No
 
 
 def _groups(motion: Motion) -> tuple[Group, ...]:
-    """The contacts of each group, where the mass matrix connects no coordinate of one with that of another; else all as one."""
+    """The contacts of each group if the mass matrix couples no coordinates of different groups; else one group of all."""
     model, count = motion.system.model, len(motion.system.model.contacts)
     everything = (Group((1 << count + len(model.frictions)) - 1, (1 << count + 2 * len(model.frictions)) - 1),)
     names = dict.fromkeys(contact.group for contact in model.contacts)
@@ -142,11 +146,11 @@ def _image(event: OrbitEvent, model: Model, images: Sequence[int]) -> OrbitEvent
 
 
 def _listed(motion: Motion) -> tuple[list[OrbitEvent], np.ndarray, np.ndarray]:
-    """The events that change the mode but for impacts that die away, their times, and how fast each closes a contact."""
+    """The events that change the mode, without the impacts of accumulations; their times; and how fast each closes a contact."""
     found, dense = motion.events, motion.dense
     times, codes, speeds = found.times, found.codes, np.full(len(found), math.inf)
     speeds[codes[:, 0] == EventCode.IMPACT] = impact_speeds(motion)
-    # rest is told apart from the event that brings it, and at the start of a motion
+    # a rest is recorded besides the event that brings it, and at the start of a motion: it counts only if it stands alone
     alone = (np.searchsorted(times, times, side="right") - np.searchsorted(times, times) == 1) & (times > motion.start)
     chosen = np.isin(codes[:, 0], CHANGES) & (alone | (codes[:, 0] != EventCode.RESTING))
     kept = np.flatnonzero(chosen)
@@ -172,9 +176,9 @@ def impact_speeds(motion: Motion) -> np.ndarray:
 
 
 def _dying(codes: np.ndarray, speeds: np.ndarray) -> np.ndarray:
-    """Which events of a group, (n, 2), are impacts of a contact that die away until it is held: there are infinitely many.
+    """Which events of a group, (n, 2), belong to an accumulation: infinitely many impacts that die away until contacts are held.
 
-    They die away after the last one that is slower than the one after it.
+    The accumulation begins after the last impact that is slower than its successor.
     """
     dying = np.zeros(len(codes), dtype=bool)
     for last in np.flatnonzero(np.isin(codes[:, 0], (EventCode.HELD, EventCode.RESTING))):
@@ -189,9 +193,10 @@ def _dying(codes: np.ndarray, speeds: np.ndarray) -> np.ndarray:
 def _in_order(
     events: tuple[OrbitEvent, ...], times: tuple[float, ...], together: float
 ) -> tuple[tuple[OrbitEvent, ...], tuple[float, ...]]:
-    """Events of different parts at one instant, as of cells that move alike, part by part with the mode after all of them.
+    """Events in an order that does not depend on rounding: those of different contacts at one instant, as of cells that move
+    alike, are sorted by contact, and each has the mode after all of them.
 
-    It is rounding that decides which of them come first, and which are one event.
+    Rounding decides which of them the motion records first, and which of them it records as one event.
     """
     found, begin = list[tuple[OrbitEvent, float]](), 0
     for end in range(1, len(events) + 1):

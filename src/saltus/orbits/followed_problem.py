@@ -1,8 +1,9 @@
-"""Orbits that are followed through all of their events, x = Phi(x): those whose impacts die away, and those with dry friction.
+"""Orbits that are followed through all of their events, x = Phi(x): those with accumulations of impacts, or with dry friction.
 
-The unknowns are the state at a phase of the load at which nothing happens. Events between are those of the motion, whatever
-they are; their derivatives are those of `sensitivities`. An accumulation of impacts is a map of its own there, with the
-derivatives of its end. What contacts hold at the section has the derivatives 0, and so has the speed of what sticks.
+The unknowns are the state at a section, a phase of the load at which no event happens. The motion Phi has whatever events it
+has, and its derivatives are those of `sensitivities`, in which an accumulation of impacts is a single map with the derivatives of
+its end. Derivatives to coordinates that contacts hold at the section are 0, and so are those to the speed of a sticking
+coordinate.
 """
 
 from __future__ import annotations
@@ -22,25 +23,25 @@ from saltus.orbits.sampled_motion import SampledMotion
 from saltus.systems import System, image_of
 from saltus.taylor import FREQUENCY
 
-DYING = 1e-5  # Slower impacts are not listed: they are of an accumulation.
-CLOSED = 1e-9  # A contact whose gap and rate are smaller at the section is closed there.
+DYING = 1e-5  # Slower impacts are not listed: they belong to an accumulation.
+CLOSED = 1e-9  # A contact is closed at the section if its gap and the gap's rate are smaller than this there.
 
 
 @dataclass(frozen=True)
 class FollowedEquations(Equations):
-    """The problem at one point, with the events on the way round."""
+    """The problem at one point, with the events along the motion."""
 
     followed: FollowedEvents | None  # None if extremes were not asked for
-    middle: np.ndarray | None  # the state after half of the time; None likewise
+    middle: np.ndarray | None  # the state after half of the time; None if extremes were not asked for
 
 
 class FollowedProblem(Problem):
-    """The equations x = Phi(x) of a system with contacts or frictions; of a symmetric orbit, x is the image of Phi(x) of half a
-    period."""
+    """The equations x = Phi(x) of a system with contacts or frictions; for a symmetric orbit x is the mirror image of Phi(x) over
+    half a period."""
 
-    stray = 0.5  # Where the map jumps, the corrector wanders: ten times as far as a step may end from where it was predicted.
-    rounded = 1e-7  # Multipliers grow without end towards some changes of events: it is as large as rounding times 1e8 to 1e9.
-    # The last place at which they were evaluated, and what was found: it is often asked for again, with more of it.
+    stray = 0.5  # Where the map jumps, the corrector wanders; this is ten times the accepted distance from the predicted point.
+    rounded = 1e-7  # What rounding leaves where multipliers are 1e8 to 1e9, as they become towards some changes of events.
+    # The last place at which the equations were evaluated, with the result: they are often asked for again with the extremes.
     _latest: tuple[np.ndarray, tuple[Motion, FollowedEquations] | None] | None = None
 
     @property
@@ -55,8 +56,8 @@ class FollowedProblem(Problem):
         return math.inf
 
     def held(self, state: np.ndarray, system: System) -> dict[int, float]:
-        """The places of what does not move at a section, but for rounding, with its values there: coordinates that contacts hold,
-        their velocities, and the speeds of what sticks."""
+        """The state variables that are fixed at the section, up to rounding, with their values: coordinates that contacts hold,
+        their velocities, and the velocities of coordinates that stick."""
         found, own, names = dict[int, float](), self.own, system.model.coordinates
         for contact in system.model.contacts:
             place = names.index(contact.coordinate)
@@ -68,7 +69,7 @@ class FollowedProblem(Problem):
         return found
 
     def start_state(self, unknowns: np.ndarray, system: System) -> np.ndarray:
-        """The state at the section, with contacts closed, and frictions that stick, that are so but for rounding."""
+        """The state at the section, in which contacts that are closed, and frictions that stick, up to rounding do so exactly."""
         state = unknowns.copy()
         for place, value in self.held(unknowns, system).items():
             state[place] = value
@@ -100,7 +101,8 @@ class FollowedProblem(Problem):
         return equations
 
     def _evaluated(self, unknowns: np.ndarray, values: np.ndarray) -> tuple[Motion, FollowedEquations] | None:
-        """The motion over the time that the equations cover, and these without extremes; None where it cannot be followed."""
+        """The motion over the time that the equations cover, and the equations without extremes; None where the motion cannot be
+        followed."""
         frequency = self.frequency(values)
         if not (frequency > 0.0 and np.isfinite(unknowns).all() and np.isfinite(values).all()):
             return None
@@ -132,13 +134,13 @@ class FollowedProblem(Problem):
         return np.asarray((image_of(self.system.model, middle) if self.signature.period % 2 else middle) - unknowns)
 
     def state_at(self, phase: float, unknowns: np.ndarray, values: np.ndarray, near: np.ndarray) -> np.ndarray | None:
-        """The state at a phase of the load of the motion that begins at the section: of those in its forcing periods the nearest
-        one to another state. None where it cannot be followed."""
+        """The state of the orbit at a phase of the load: of one such state in each forcing period, the nearest to the state
+        `near`. None where the motion cannot be followed."""
         if self.evaluate(unknowns, values) is None or self._latest is None or self._latest[1] is None:
             return None
         motion, signature = self._latest[1][0], self.signature
         ahead = (phase - float(signature.section or 0.0)) % math.tau + math.tau * np.arange(signature.period)
-        later = ahead >= math.tau * signature.span  # of a symmetric orbit, whose second half is the image of the first one
+        later = ahead >= math.tau * signature.span  # in the second half of a symmetric orbit, the image of the first half
         times = motion.start + np.where(later, ahead - math.tau * signature.span, ahead) / self.frequency(values)
         states = np.array([np.concatenate([np.atleast_1d(part) for part in motion.at(time)]) for time in times.tolist()])
         states = np.where(later[:, None], image_of(self.system.model, states) if later.any() else states, states)
@@ -169,7 +171,8 @@ class FollowedProblem(Problem):
         return derivatives_of(request, self._program.at(parameters, self._records))
 
     def _impacts(self, motion: Motion) -> np.ndarray:
-        """Times and speeds of the impacts of each contact that do not die away, (n, 2): of cells in step each has its own."""
+        """Times and speeds of the impacts, (n, 2), without those of accumulations; if several contacts close at one instant, each
+        has its own row."""
         impacts, names, rows = motion.impacts, self.system.model.coordinates, [np.empty((0, 2))]
         for i, contact in enumerate(self.system.model.contacts):
             speeds = np.abs(impacts.velocity_before[:, names.index(contact.coordinate)])
@@ -178,7 +181,7 @@ class FollowedProblem(Problem):
         return np.asarray(found[np.argsort(found[:, 0], kind="stable")])
 
     def _extremes(self, sampled: SampledMotion | None) -> np.ndarray:
-        """The extrema of all coordinates and the least values of the margins, in the places of the other orbits'."""
+        """The extrema of all coordinates and the least values of the margins, in the columns that other orbits use."""
         extremes = np.full((int(sampled is not None), at.LEAST_MARGIN + max(1, len(self.margins))), np.inf)
         if sampled is not None:
             extremes[:, at.CROSSINGS] = 0.0

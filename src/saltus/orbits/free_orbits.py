@@ -1,4 +1,4 @@
-"""Free periodic motions without loss: from one turning point to the next and back, and their period along the amplitude."""
+"""Free periodic motions of systems without loss, from one turning point to the other and back, and their period by amplitude."""
 
 from __future__ import annotations
 
@@ -25,15 +25,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class FreeOrbitSettings:
-    """The numbers by which a free motion is followed until it is back where it began."""
+    """How a free motion is followed until it is back where it began."""
 
-    tol: float = 1e-15  # Of the steps: periods are then exact to some 1e-14.
-    first_duration: float = 8.0  # What is followed first; then twice as long, and so on.
+    tol: float = 1e-15  # The error of a step: periods are then exact to some 1e-14.
+    first_duration: float = 8.0  # How long the motion is followed first; the time is then doubled until it comes back.
     most_duration: float = (
-        1e5  # Beside a saddle a period grows like the logarithm of the distance: one of 1e5 cannot be told from it.
+        1e5  # Near a saddle the period grows as the logarithm of the distance from it: with rounding 1e5 is never reached.
     )
     returned: float = 1e-9  # The distance from the start, relative to the amplitude, at which a motion has come back.
-    parts: int = 16  # Of a step, between which the velocity's sign is compared: a step is at most a third of the motion's period.
+    # The sign of the velocity is compared at the ends of so many parts of each step, which takes a third of the period at most.
+    parts: int = 16
 
 
 SETTINGS = FreeOrbitSettings()
@@ -53,7 +54,7 @@ class FreeOutcome(Sentence):
 class FreeOrbit(Result):
     """A free periodic motion of a system with one coordinate, which begins at rest at one of its two turning points.
 
-    Where a wall throws it back, the wall is the other turning point.
+    If it hits a wall and is thrown back, the wall is the other turning point.
 
     Attributes
     ----------
@@ -106,9 +107,9 @@ class FreeOrbit(Result):
 def free_orbit(system: System, amplitude: float) -> FreeOrbit:
     """The free periodic motion that begins at rest at the coordinate `amplitude`, of a system without loss.
 
-    It is followed from one turning point, theta' = 0, to the other one and back; each is a root of its Taylor series, and every
-    impact on the way is exact. The load is constant. At a distance d beside a saddle, where the energy says little of the turning
-    point, the period is exact to about 1e-16 / d^2.
+    It is followed from one turning point, theta' = 0, to the other one and back. Each turning point is a root of the velocity's
+    Taylor series, and every impact between them is exact. The load must be constant. If the motion begins at a distance d from a
+    saddle, its period is exact to about 1e-16 / d^2, because rounding of the energy then moves the turning point.
 
     Parameters
     ----------
@@ -120,7 +121,7 @@ def free_orbit(system: System, amplitude: float) -> FreeOrbit:
     Raises
     ------
     ParameterError
-        Several coordinates, a load that varies, an amplitude without meaning.
+        The system has several coordinates, its load varies, or the amplitude is no finite number.
     MotionError
         The motion does not come back: `FreeOutcome` says why.
 
@@ -141,7 +142,7 @@ def free_orbit(system: System, amplitude: float) -> FreeOrbit:
 
 @answered
 def backbone(system: System, amplitudes: Iterable[float], *, progress: Progress = silent) -> xarray.Dataset:
-    """The free periodic motions of a system without loss along their amplitude: the backbone of its resonances.
+    """The free periodic motions of a system without loss for several amplitudes: the backbone curve of its resonances.
 
     Parameters
     ----------
@@ -161,7 +162,7 @@ def backbone(system: System, amplitudes: Iterable[float], *, progress: Progress 
     Raises
     ------
     ParameterError
-        Several coordinates, a load that varies, amplitudes that are no numbers.
+        The system has several coordinates, its load varies, or the amplitudes are no finite numbers.
 
     Examples
     --------
@@ -218,7 +219,7 @@ def _followed(system: System, amplitude: float, duration: float) -> Motion:
 
 
 def _found(system: System, amplitude: float) -> FreeOrbit | FreeOutcome:
-    """The free orbit that begins at rest at a place, or what becomes of the motion."""
+    """The free orbit that begins at rest at the coordinate `amplitude`, or the reason why the motion is not periodic."""
     duration = SETTINGS.first_duration
     while duration <= SETTINGS.most_duration:
         motion = _followed(system, amplitude, duration)
@@ -240,7 +241,7 @@ def _moves(motion: Motion) -> bool:
 
 
 def _closed(motion: Motion, amplitude: float, half: float, period: float) -> FreeOrbit | FreeOutcome:
-    """The orbit that turns round at these instants, if it is back at its start at the second one."""
+    """The orbit whose turning points are reached at `half` and `period`, if it is then back at its start."""
     turning, back = (float(motion.at(time)[0]) for time in (half, period))
     defect, size = abs(back - amplitude), max(abs(amplitude), abs(turning))
     if defect > SETTINGS.returned * size:

@@ -1,4 +1,4 @@
-"""Orbits from the dataset of a branch or of a curve: what is kept of each is all that it is."""
+"""Orbits from the dataset of a branch or of a curve, without loss: the dataset keeps all their unknowns and signatures."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ NEEDED = ("parameter", "unknowns")
 def orbits_of(dataset: xarray.Dataset) -> list[PeriodicOrbit]:
     """The orbits along `point` of a dataset that `Branch.to_xarray` or `SpecialCurve.to_xarray` made, bit for bit, in order.
 
-    The equations are evaluated at the unknowns as they are kept, which must solve them, and orbits that rest are followed from
-    their first release. `continue_orbit` goes on from any.
+    The equations are evaluated at the kept unknowns, which must solve them; orbits that rest are followed again from
+    their first release. `continue_orbit` can go on from each of these orbits.
 
     Parameters
     ----------
     dataset
-        What `to_xarray` of a branch or a curve gave.
+        The dataset that `to_xarray` of a branch or a curve gave.
 
     Raises
     ------
     ParameterError
-        A dataset of something else, of other equations than the model has now, or of another version of saltus;
-        unknowns that do not solve the equations; a model of one's own that is not registered (`saltus.register`).
+        The dataset is of another kind, of other equations than the model has now, or of another version of saltus; its
+        unknowns do not solve the equations; or the model is the user's own and not registered (`saltus.register`).
 
     Examples
     --------
@@ -81,7 +81,7 @@ def _signatures(dataset: xarray.Dataset) -> list[Signature]:
 
 
 def _signature(sides: np.ndarray, periods: Any, symmetric: Any, side: Any) -> Signature:
-    """Sides are filled up with 0, which is none."""
+    """The signature in one row of the dataset, where the sides are padded with 0."""
     return Signature(tuple(int(s) for s in sides if s), int(periods), bool(symmetric), int(side))
 
 
@@ -96,7 +96,7 @@ def _orbit(problem: Problem, row: np.ndarray, value: np.ndarray) -> PeriodicOrbi
 
 
 def _resting_orbits(dataset: xarray.Dataset, system: System) -> list[PeriodicOrbit]:
-    """The orbits of a family that rests for a part of its period: the load's release that they begin with says all."""
+    """The orbits of a family of resting orbits: the release of the load with which each begins determines it."""
     path, columns = str(dataset.attrs["path"]), ("parameter", "period")
     orbits: list[PeriodicOrbit] = []
     for first, value, periods in zip(dataset["releases"].values[:, 0], *(dataset[name].values for name in columns), strict=True):

@@ -1,4 +1,4 @@
-"""Through a grazing: the signature on its other side, and the direction in which its orbits are real."""
+"""The continuation of a branch through a grazing: the signature on its other side, and the direction with admissible orbits."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from saltus.orbits.tolerances import TOLERANCES
 
 PROBES = 10.0 ** -np.arange(2, 12.0)  # distances along the new branch, tried in turn until one direction has admissible orbits
 
-BEGUN = (1e-4, 1e-3, 1e-2)  # the same where an excursion begins, whose speeds grow as the third power of the distance
-MOST_TOGETHER = 2  # events of several contacts that change at one point
+BEGUN = (1e-4, 1e-3, 1e-2)  # the same where an excursion from a closed contact begins, whose speeds grow as the distance cubed
+MOST_TOGETHER = 2  # the most events of several contacts that may change at one point
 
 
 def other_side(point: OrbitPoint) -> OrbitPoint | End:
-    """The point of the new branch at a grazing, with the direction in which it goes on; or why there is none.
+    """The point of the branch beyond a grazing, with the direction in which it goes on; or why there is none.
 
-    A gap that touches zero between impacts gains a pair of impacts without speed there, or a single one at a wall that turns
-    the motion round; impacts that have lost their speed are left out.
+    Where the gap touches zero between impacts, the new signature has a pair of impacts without speed there, or a single one at a
+    wall, which turns the motion round. Impacts that have lost their speed are left out of it.
     """
     if isinstance(point.orbit.problem, ContactProblem):
         return _beyond_both_halves(point) if point.orbit.symmetric else _with_other_events(point)
@@ -42,9 +42,10 @@ def other_side(point: OrbitPoint) -> OrbitPoint | End:
 
 
 def _with_other_events(point: OrbitPoint, known: tuple[Cycle, ...] = ()) -> OrbitPoint | End:
-    """`other_side` with several contacts: of the signatures that may follow the first that this orbit solves and that leads on.
+    """`other_side` with several contacts: the first of the possible signatures that this orbit solves and that has admissible
+    orbits beyond.
 
-    Several events may change at once, as an orbit's symmetry has it: then one after the other is changed.
+    Symmetry may let several events change at once; these are then changed one after the other, at most `MOST_TOGETHER`.
     """
     here, reason = Switching.at(point), OrbitEnd.TWO_AT_ONCE
     known = (*known, cycle_of(point.orbit.signature))
@@ -63,7 +64,8 @@ def _with_other_events(point: OrbitPoint, known: tuple[Cycle, ...] = ()) -> Orbi
 
 
 def _beyond_both_halves(point: OrbitPoint) -> OrbitPoint | End:
-    """The same of a symmetric orbit: both halves change at once, or one after the other, which may break the symmetry."""
+    """`other_side` of a symmetric orbit with several contacts: first both halves change alike, then, over the full period, one
+    after the other, which may break the symmetry."""
     for start in (point, from_next_event(point)) if len(point.orbit.signature.events) > 1 else (point,):
         ahead = _with_other_events(start)
         if not isinstance(ahead, End):
@@ -73,7 +75,7 @@ def _beyond_both_halves(point: OrbitPoint) -> OrbitPoint | End:
 
 
 def _admissible_direction(start: OrbitPoint) -> OrbitPoint | None:
-    begun = begins_excursion(start)  # there multipliers are those of no orbit: the branch goes on from a point just ahead
+    begun = begins_excursion(start)  # the equations are then degenerate at `start`: the branch goes on from a point just ahead
     for probe in BEGUN if begun else PROBES:
         for point in (start, start.turned()):
             ahead = point.beside(probe)
@@ -89,7 +91,7 @@ def _turns_round(problem: Problem, side: int) -> bool:
 
 
 def inserted(point: OrbitPoint) -> tuple[Problem, np.ndarray]:
-    """The problem and its unknowns with impacts of no speed where the gap touches zero."""
+    """The problem whose signature has additional impacts where the gap touches zero, and its unknowns: they have no speed."""
     problem, signature = point.orbit.problem, point.orbit.signature
     extremes = point.equations.extremes
     segment = int(np.argmin(extremes[:, at.HUMP]))
@@ -106,7 +108,7 @@ def inserted(point: OrbitPoint) -> tuple[Problem, np.ndarray]:
 
 
 def removed(point: OrbitPoint) -> tuple[Problem, np.ndarray] | End:
-    """The problem and its unknowns without the impacts that have lost their speed, or why there is none."""
+    """The problem whose signature lacks the impacts that have lost their speed, and its unknowns; or why there is none."""
     problem, signature = point.orbit.problem, point.orbit.signature
     n = len(signature.sides)
     phases, speeds = point.solution.unknowns[::2], point.solution.unknowns[1::2]
@@ -136,7 +138,7 @@ def _vanishing_pair(phases: np.ndarray, speeds: np.ndarray, slow: int, closing: 
 
 
 def _without_impacts(point: OrbitPoint, slow: int) -> tuple[Problem, np.ndarray] | End:
-    """The orbit that touches contact once a period, as one without impacts: its state at phase 0."""
+    """An orbit that only touches the contact once a period, as an orbit without impacts: the problem and the state at phase 0."""
     problem, signature = point.orbit.problem, point.orbit.signature
     if signature.symmetric:
         return End(OrbitEnd.GRAZES_INTO_REST, point.parameter)
@@ -145,7 +147,7 @@ def _without_impacts(point: OrbitPoint, slow: int) -> tuple[Problem, np.ndarray]
     side = signature.along()[int(np.argmax(lengths))]
     phase_zero = 2.0 * np.pi * np.ceil(touch / (2.0 * np.pi))
     contact = np.array([float(problem.at(point.solution.values).model.contact), 0.0])
-    for periods in range(1, signature.period + 1):  # three families may meet here: go on with the one of the shortest period
+    for periods in range(1, signature.period + 1):  # families of several periods may meet here: take the shortest period
         other = problem.with_signature(Signature((), periods, False, side))
         state = other.carried(contact, touch, phase_zero, point.solution.values)
         later = other.carried(contact, touch, phase_zero + other.closing, point.solution.values)

@@ -1,4 +1,8 @@
-"""An orbit in other numbers: as its own image, as another one gone round several times, renumbered from another impact."""
+"""The image of an orbit, orbits that are their own images or repeat a shorter one, and unknowns counted from another impact.
+
+The image of an orbit is the same orbit half a period later and, if its period q is odd, mirrored. An orbit that is its own image
+is symmetric (q odd), or a shorter one that is gone round twice (q even).
+"""
 
 from __future__ import annotations
 
@@ -17,17 +21,17 @@ NEAR_THE_END = (0.99, 0.95, 0.9)  # Shares of the last step: at the end itself t
 
 
 def asymmetry(point: OrbitPoint) -> np.ndarray | None:
-    """By how much the orbit differs from its own image.
+    """The difference of an orbit's image from the orbit itself.
 
-    That is its mirror image half a period later for an odd period of a symmetric system, and itself half a period later for an
-    even one. None where it could not be its own image, or is by construction.
+    None where the signature rules out that the orbit is its own image, or its equations imply it (a symmetric signature).
     """
     both = halves(point)
     return None if both is None else np.asarray(both[1] - both[0])
 
 
 def halves(point: OrbitPoint) -> np.ndarray | None:
-    """The unknowns of both halves of a period, each as of the equations of one, (2, n); None as for `asymmetry`."""
+    """The unknowns of both halves of a period, each as unknowns of the equations over one half, (2, n); None as for
+    `asymmetry`."""
     signature, problem, unknowns = point.orbit.signature, point.orbit.problem, point.solution.unknowns
     n, odd = len(signature.sides), signature.period % 2
     if signature.symmetric or n % 2:
@@ -47,9 +51,9 @@ def halves(point: OrbitPoint) -> np.ndarray | None:
 
 
 def on_family(point: OrbitPoint, parent: OrbitPoint) -> OrbitPoint | None:
-    """The parent's orbit at which a family ends, as a solution of the family's own equations: both halves of it are alike.
+    """The parent's orbit at which a family ends, as a solution of the family's own equations, in which both its halves are alike.
 
-    There the family turns back along its images: its tangent leads from a `point` beside to the image of that.
+    There the family turns back along its images: the tangent leads from the family's `point` beside it to that point's image.
 
     Returns
     -------
@@ -71,7 +75,7 @@ def on_family(point: OrbitPoint, parent: OrbitPoint) -> OrbitPoint | None:
 
 
 def beside_image(point: OrbitPoint, last: OrbitPoint) -> OrbitPoint | None:
-    """A point of a family between one and its end at its own image, as near to the end as it can be solved for."""
+    """A point of a family between `point` and its end `last`, as near to the end as the equations can be solved."""
     chord = last.place - point.place
     for share in NEAR_THE_END:
         beside: OrbitPoint | None = point.curve.solve(between(point, last, share), chord / point.curve.norm(chord))
@@ -87,7 +91,7 @@ def passes_image(a: OrbitPoint, b: OrbitPoint) -> bool:
 
 
 def falls_onto_image(a: OrbitPoint, b: OrbitPoint) -> bool:
-    """Whether a step has ended on the branch of the orbits that are their own images, coming from one that is not."""
+    """Whether a step has jumped from an orbit that is not its own image onto the branch of orbits that are."""
     before, after = asymmetry(a), asymmetry(b)
     return (
         before is not None and after is not None and bool(np.abs(before).max() > TOLERANCES.image > 100.0 * np.abs(after).max())
@@ -95,14 +99,14 @@ def falls_onto_image(a: OrbitPoint, b: OrbitPoint) -> bool:
 
 
 def is_image(point: OrbitPoint, within: float = 1e-2 * TOLERANCES.image) -> bool:
-    """Whether an orbit is its own image, as another one gone round twice is, that was solved for as if it were none."""
+    """Whether an orbit is its own image, although its equations do not imply it."""
     difference = asymmetry(point)
     return difference is not None and bool(np.abs(difference).max() < within)
 
 
 def parent_of(point: OrbitPoint, within: float = TOLERANCES.grazing_orbits) -> OrbitPoint | None:
-    """The orbit that is gone round twice, or from its image back to itself, of one that is its own image within so much; None for
-    others."""
+    """The orbit of the parent, over half of the period, of an orbit that is its own image up to `within`; None for other
+    orbits."""
     problem = point.curve.problem.halved
     if problem is None or not is_image(point, within):
         return None
@@ -112,7 +116,7 @@ def parent_of(point: OrbitPoint, within: float = TOLERANCES.grazing_orbits) -> O
 
 
 def repetition(point: OrbitPoint) -> str | None:
-    """What an orbit is that is another one gone round several times, or its own mirror image; None for one that is not."""
+    """Which other orbit an orbit repeats, in words: a symmetric one, or one of a shorter period; None if it repeats none."""
     signature, n = point.orbit.signature, len(point.orbit.signature.sides)
     difference = asymmetry(point)
     if signature.period % 2 and difference is not None and np.abs(difference).max() < TOLERANCES.grazing_orbits:
@@ -129,9 +133,8 @@ def repetition(point: OrbitPoint) -> str | None:
 
 
 def renumbered(problem: Problem, unknowns: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
-    """The unknowns of an orbit, counted from another impact and shifted by forcing periods to lie nearest to those of a point.
-
-    None where the signatures differ.
+    """The unknowns of an orbit, begun at another impact and shifted by whole forcing periods such that they are nearest to those
+    of the point `other`; None where the signatures differ.
     """
     target, signature = other.orbit.signature, problem.signature
     n = len(signature.sides)
@@ -156,7 +159,8 @@ def renumbered(problem: Problem, unknowns: np.ndarray, other: OrbitPoint) -> np.
 
 
 def nearest(point: OrbitPoint, place: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
-    """A place on the equations of a point in the numbers in which it lies nearest to another point; None if it cannot."""
+    """A place on the curve of `point`, in the unknowns that are nearest to those of `other`: begun at another impact, or given at
+    the section of `other`. None if the orbits cannot be compared so."""
     problem, n = point.curve.problem, point.curve.problem.size
     if isinstance(problem, FollowedProblem):
         unknowns = _at_section_of(problem, place, other)
@@ -166,8 +170,8 @@ def nearest(point: OrbitPoint, place: np.ndarray, other: OrbitPoint) -> np.ndarr
 
 
 def _at_section_of(problem: FollowedProblem, place: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
-    """The state at the section of a point, as near to the point's as may be, of a motion that is followed through its events;
-    None where the point is of another kind."""
+    """The state of an orbit at the section of the point `other`, in the forcing period in which it is nearest to that of `other`;
+    None where `other` has no section, or another period or symmetry."""
     target, n = other.orbit.signature, problem.size
     if target.section is None or (target.period, target.symmetric) != (problem.signature.period, problem.signature.symmetric):
         return None
@@ -175,7 +179,7 @@ def _at_section_of(problem: FollowedProblem, place: np.ndarray, other: OrbitPoin
 
 
 def with_section_of(point: OrbitPoint, other: OrbitPoint) -> OrbitPoint:
-    """A point that is followed through its events with its state at the section of another one; else the point as it is."""
+    """A point whose orbit is followed through its events, given at the section of another point; other points are unchanged."""
     place = None
     if isinstance(point.curve.problem, FollowedProblem) and not point.curve.joins(other.curve):
         place = nearest(point, point.place, other)

@@ -1,7 +1,7 @@
-"""Orbits, mostly repelling ones, from near returns: motions on their way or in chaos come back near to where they were.
+"""Orbits, mostly repelling ones, from near returns: motions in a transient or in chaos come back near to an earlier state.
 
-The states nearest to which they do are improved by Newton's method on the stroboscopic section, all of them at once in lanes;
-what converges is then solved for as an orbit with its impacts, each once.
+The states of the nearest returns are improved by Newton's method on the stroboscopic section, all of them at once in lanes.
+Those that converge are solved for as orbits with their impacts, each orbit once.
 """
 
 from __future__ import annotations
@@ -27,19 +27,20 @@ class NearReturnSettings:
     """Which states may lead to orbits, and how they are improved."""
 
     near: float = 0.15  # Newton's method is tried from returns nearer than this.
-    guesses: int = 12  # The largest number of such returns, for each period at each value: the nearest ones.
+    guesses: int = 12  # The largest number of such returns for each period at each value; the nearest ones are taken.
     apart: float = 0.05  # The least distance between two of these returns.
     iterations: int = 8  # Steps of Newton's method on the section.
     longest: float = 0.3  # The longest of these steps: beyond it the map is far from linear.
-    converged: float = 1e-7  # Distance of a state from its image, at which it is on an orbit but for rounding.
+    converged: float = 1e-7  # Distance of a state from its image below which it is taken to be on an orbit.
     same_state: float = 1e-5  # States at one value are on the same orbit if they are this near.
     still: float = 1e-6  # An orbit no larger than this is rest.
-    # An orbit with a multiplier this near to 1 is one of a continuum at its value of the parameter, such as those of a mass that
-    # no wall and no spring holds: it has no branch. Those of a fold are as near within 1e-14 of its value alone.
+    # An orbit with a multiplier this near to 1 belongs to a continuum of orbits at one value of the parameter, such as those of a
+    # mass that no wall and no spring holds, and has no branch. Near a fold a multiplier is as near to 1 only within 1e-14 of the
+    # fold's parameter.
     isolated: float = 1e-7
     tol: float = 1e-11  # The error of a step.
-    # With contacts or frictions and more state variables than this, derivatives come from motions one by one, by the code that
-    # branches need as well: that for lanes, which leave events to it, takes longer to compile (minutes for four cells).
+    # With contacts or frictions and more state variables than this, derivatives are computed motion by motion, by the code that
+    # branches need as well. The code for lanes would take longer to compile (minutes for four cells).
     in_lanes: int = 4
 
 
@@ -49,18 +50,18 @@ SETTINGS = NearReturnSettings()
 def orbits_near_returns(
     system: System, path: str, values: np.ndarray, states: np.ndarray, known: list[np.ndarray], max_period: int
 ) -> list[PeriodicOrbit]:
-    """Orbits of up to `max_period` forcing periods near which motions return to where they were; those of a continuum left out.
+    """Orbits of up to `max_period` forcing periods near which motions nearly return; orbits of a continuum are left out.
 
     Parameters
     ----------
     system, path
         What moves, and the parameter that is varied.
     values
-        (n,) of it.
+        Its values, (n,).
     states
-        (n, motions, kept, d): successive stroboscopic states of motions at each of them; nan where there are fewer.
+        Successive stroboscopic states of motions at each value, (n, motions, kept, d); nan where there are fewer.
     known
-        For each value the states (k, d) at phase 0 of orbits that are known there, which are not given again.
+        For each value the states (k, d) at phase 0 of orbits that are known there, which are not returned again.
     """
     found: list[tuple[int, PeriodicOrbit]] = []
     known = [other.reshape(-1, system.dimension) for other in known]
@@ -88,12 +89,13 @@ def solved_near(system: System, path: str, state: np.ndarray, period: int) -> Pe
 
 
 def _is_isolated(orbit: PeriodicOrbit) -> bool:
-    """Whether there is no other orbit at once beside one."""
+    """Whether an orbit is isolated from other orbits at its value of the parameter."""
     return bool((np.abs(orbit.multipliers - 1.0) > SETTINGS.isolated).all())
 
 
 def _guesses(states: np.ndarray, period: int) -> np.ndarray:
-    """The states (k, d) nearest to which motions (n, kept, d) come back after a period, but that do not repeat themselves."""
+    """The states (k, d) at which motions (n, kept, d) nearly return after `period`, without repeating themselves; nearest
+    first."""
     distance = np.abs(states[:, period:] - states[:, :-period]).max(axis=2).ravel()
     begin = states[:, :-period].reshape(-1, states.shape[-1])
     chosen = begin[:0]
@@ -126,9 +128,9 @@ def _improved(system: System, path: str, values: np.ndarray, states: np.ndarray,
 
 
 def _mapped(system: System, path: str, values: np.ndarray, states: np.ndarray, period: int) -> tuple[np.ndarray, np.ndarray]:
-    """States (n, d) some periods later, and their derivatives to the ones at the start, (n, d, d).
+    """The states (n, d) `period` forcing periods later, and their derivatives to the states at the start, (n, d, d).
 
-    A contact that is closed at the start stays so: its coordinate and velocity are varied no more.
+    A contact that is closed at the start stays closed: derivatives to its coordinate and velocity are 0.
     """
     if system.model.held and system.dimension > SETTINGS.in_lanes:
         return _mapped_singly(system, path, values, states, period)
@@ -140,7 +142,7 @@ def _mapped(system: System, path: str, values: np.ndarray, states: np.ndarray, p
 def _mapped_singly(
     system: System, path: str, values: np.ndarray, states: np.ndarray, period: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The same, motion by motion; nan where one cannot be followed or has no derivatives."""
+    """As `_mapped`, one motion after the other; nan where a motion cannot be followed or has no derivatives."""
     problem = problem_of(system, Signature((), period, section=0.0), (path,), SETTINGS.tol)
     held = held_by_contacts(system, states)
     ends, slopes = np.full(states.shape, np.nan), np.full((*states.shape, states.shape[1]), np.nan)

@@ -14,7 +14,7 @@ NEWTON_ITERATIONS = 12  # enough from a guess near the orbit; a motion that has 
 
 @dataclass(frozen=True)
 class Solution:
-    """A point that solves the equations, and what was evaluated there."""
+    """A point that solves the equations, with the equations as evaluated there."""
 
     unknowns: np.ndarray
     values: np.ndarray  # of the parameters

@@ -1,4 +1,4 @@
-"""A periodic orbit: what it is, how stable, how large, and its own check."""
+"""A periodic orbit: its impacts, amplitude, multipliers and margins, and its check by direct simulation."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ class PeriodicOrbit(Result):
     Attributes
     ----------
     problem
-        The equations that it solves: the system, the parameters and the sequence of its impacts.
+        The equations that it solves: those of a system, with given parameters and a given sequence of impacts.
     solution
-        Their solution.
+        The solution of these equations.
 
     Examples
     --------
@@ -92,7 +92,7 @@ class PeriodicOrbit(Result):
 
     @cached_property
     def system(self) -> System:
-        """The system that it is an orbit of."""
+        """The system, with the orbit's parameters."""
         return self.problem.at(self.solution.values)
 
     @property
@@ -102,7 +102,7 @@ class PeriodicOrbit(Result):
 
     @property
     def period(self) -> int:
-        """q: after so many forcing periods it repeats."""
+        """q, the number of forcing periods after which the orbit repeats itself."""
         return self.signature.period
 
     @property
@@ -158,13 +158,13 @@ class PeriodicOrbit(Result):
 
     @cached_property
     def highest(self) -> float:
-        """The largest value of the coordinate, or of all of several."""
+        """The largest value of the coordinate; with several coordinates, of any of them."""
         top, bottom = self._extremes[:, at.TOP].max(), self._extremes[:, at.BOTTOM].min()
         return float(max(top, -bottom) if self.symmetric else top)
 
     @cached_property
     def lowest(self) -> float:
-        """The least value of the coordinate, or of all of several."""
+        """The least value of the coordinate; with several coordinates, of any of them."""
         return -self.highest if self.symmetric else float(self._extremes[:, at.BOTTOM].min())
 
     @property
@@ -174,39 +174,40 @@ class PeriodicOrbit(Result):
 
     @cached_property
     def clearance(self) -> float:
-        """How far the gap stays from 0 at its lowest minimum between impacts; inf where it has none; below 0: no orbit."""
+        """The gap at its lowest minimum between impacts, inf without a minimum; if it is negative this is no real motion."""
         return float(self._extremes[:, at.HUMP].min())
 
     @property
     def crossings(self) -> int:
-        """How often it passes a contact that is no singularity, in one of its periods; 0 where it has impacts."""
+        """How often it passes through a contact that is no singularity, in one of its periods; 0 for orbits with impacts."""
         return int(self._extremes[:, at.CROSSINGS].sum()) * (2 if self.symmetric else 1)
 
     @property
     def shallowest(self) -> float:
-        """The least depth to which it goes beyond a contact that is no singularity, on either side; inf without passages."""
+        """The least depth of its passages beyond a contact that is no singularity, on either side; inf without passages."""
         return float(self._extremes[:, at.SHALLOWEST].min())
 
     @cached_property
     def slowest(self) -> float:
-        """The least speed of an impact; inf where there is none; below 0: no orbit."""
+        """The least speed of an impact, inf without impacts; if it is negative this is no real motion."""
         return float(self.speeds.min(initial=math.inf))
 
     @cached_property
     def pressing(self) -> float:
-        """With several contacts the least reaction of a closed one, or time between events; inf with one; below 0: no orbit."""
+        """With several contacts the least of the reactions of closed ones and the times between events; inf with one contact. If
+        it is negative this is no real motion."""
         return self.problem.pressing(self.solution.unknowns, self.solution.equations)
 
     @property
     def admissible(self) -> bool:
-        """Whether it is a motion of the system: every impact has a speed, the next one comes later, the gap is open between."""
+        """Whether it is a motion of the system: every impact has a positive speed, events are in order, and gaps are open."""
         phases = self._phases
         in_order = np.diff(np.append(phases, phases[:1] + 2.0 * math.pi * self.period)) > -TOLERANCES.touch
         return min(self.clearance, self.slowest, self.pressing) > -TOLERANCES.touch and bool(in_order.all())
 
     @cached_property
     def margins(self) -> dict[str, float]:
-        """The least value of each of the model's margins; below 0 the mechanism could not move so (errata 20, 21)."""
+        """The least value of each of the model's margins; a negative one is passed, see `MarginKind` (errata 20, 21)."""
         least = self._extremes[:, at.LEAST_MARGIN :].min(axis=0)
         return dict(zip(self.problem.margins, map(float, least), strict=False))
 
@@ -222,9 +223,9 @@ class PeriodicOrbit(Result):
 
     @property
     def grazes(self) -> bool:
-        """Whether it touches the contact without speed: motions beside it then have no derivative, and multipliers no meaning.
+        """Whether it touches the contact without speed, so that the map has no derivative there and multipliers have no meaning.
 
-        Where the contact is no singularity (`ContactRegularity.CONTINUOUS`) it never does in this sense.
+        False where the contact is no singularity (`ContactRegularity.CONTINUOUS`): multipliers then keep their meaning.
         """
         speed = self.problem.touching_speed(self.solution.unknowns, self.solution.equations)
         return not self.problem.passes_contact and min(abs(self.clearance), abs(speed)) < TOLERANCES.touch
@@ -235,9 +236,10 @@ class PeriodicOrbit(Result):
         return bool((np.abs(self.multipliers) < 1.0).all()) and not self.grazes
 
     def start(self) -> dict[str, Any]:
-        """The arguments of `simulate` that start the motion: just before its first impact, or at phase 0.
+        """The arguments of `simulate` that start a motion on the orbit: just after its first impact or, without impacts, at phase
+        0.
 
-        With several contacts it starts between two events.
+        With several contacts, or where the orbit is followed through its events, it starts between two events.
         """
         if isinstance(self.problem, (ContactProblem, FollowedProblem)):
             state, time = self.problem.within(self.solution.unknowns, self.solution.equations, self.solution.values)
@@ -251,12 +253,12 @@ class PeriodicOrbit(Result):
         return {model.coordinates[0]: float(model.contact), "velocity": float(after), "time": time}
 
     def motion(self, periods: float | None = None, tol: float = 1e-13) -> Motion:
-        """The exact motion from its state, over one period of the orbit if nothing else is given.
+        """The exact motion on the orbit, from `start`.
 
         Parameters
         ----------
         periods
-            How many forcing periods.
+            How many forcing periods; by default one period of the orbit.
         tol
             The error that one step may make.
         """
@@ -264,10 +266,11 @@ class PeriodicOrbit(Result):
 
     @cached_property
     def defect(self) -> float:
-        """The distance between its state and the one a period later, by direct simulation; inf if the impacts differ in number,
-        or if the motion cannot be followed, as at an event that appears or is lost.
+        """The distance between its state and the one a period later, by direct simulation; inf if the motion has another number
+        of impacts, or cannot be followed, as where an event appears or is lost.
 
-        Where it grazes, rounding decides whether there is an impact, and the distance is that of its square root.
+        If the orbit grazes, rounding decides whether the motion has an impact there, and the defect is the square root of
+        rounding.
         """
         try:
             motion = self.motion()
@@ -282,12 +285,12 @@ class PeriodicOrbit(Result):
         return self.defect_after(1)
 
     def defect_after(self, rounds: int) -> float:
-        """The same after so many of its periods, where it has no impact at its start.
+        """The distance between its state and the one after several of its periods, for orbits that do not start at an impact.
 
         Parameters
         ----------
         rounds
-            How many of its periods.
+            The number of its periods.
         """
         check_count("rounds", rounds, 1, LIMITS.periods // self.period)
         start, motion = self.start(), self.motion(rounds * self.period)
@@ -310,7 +313,7 @@ class PeriodicOrbit(Result):
 
     @property
     def section_state(self) -> np.ndarray:
-        """The same as one array, coordinates, then velocities, (d,)."""
+        """`state` as one array: coordinates, then velocities, (d,)."""
         return np.append(*self.state)
 
     def __getattr__(self, name: str) -> Any:
@@ -324,7 +327,7 @@ class PeriodicOrbit(Result):
 
     @cached_property
     def validity(self) -> Validity:
-        """Which limits of the mechanism it passes, and the share of time with a wrong reaction (errata 20, 21)."""
+        """Which margins of the model its motion respects, and for what share of the time (errata 20, 21)."""
         return self.motion().validity
 
     def to_xarray(self) -> xarray.Dataset:

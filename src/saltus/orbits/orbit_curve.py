@@ -37,7 +37,7 @@ class OrbitPoint(Point):
 
     @cached_property
     def half_way(self) -> np.ndarray | None:
-        """Of an orbit without impacts: its image half a period later less itself; None where it cannot have its own image."""
+        """The difference of the image of an orbit without impacts from the orbit; None where it cannot be its own image."""
         problem, odd = self.curve.problem, self.orbit.signature.period % 2
         sides = problem.system.model.sides and not problem.passes_contact
         if problem.signature.sides or problem.signature.closed or (odd and (sides or not self.curve.symmetric)):
@@ -68,7 +68,7 @@ class OrbitCurve(EquationCurve[OrbitPoint]):
 
     @property
     def stray(self) -> float:  # type: ignore[override]
-        """How far from the predicted one a point may be looked for."""
+        """How far from the predicted point the corrector may look for the next one."""
         return self.problem.stray
 
     @property
@@ -91,7 +91,8 @@ class OrbitCurve(EquationCurve[OrbitPoint]):
         return OrbitPoint(self, found.place, tangent, found.iterations, found.evaluation)
 
     def advance(self, before: OrbitPoint | None, point: OrbitPoint, step: float) -> OrbitPoint | None:
-        """The point a step further; a short step may go round the corner at which the state of phase 0 passes the contact."""
+        """The point a step further. A short step may go round a corner of the curve, where the state at phase 0 passes the
+        contact (see `_seen_from`)."""
         ahead = super().advance(before, point, step)
         if ahead is not None or step > STEPS.restart or not self.problem.passes_contact:
             return ahead
@@ -101,7 +102,7 @@ class OrbitCurve(EquationCurve[OrbitPoint]):
         return ahead if self.norm(_seen_from(point, ahead).tangent - point.tangent) < STEPS.off else None
 
     def turn(self, a: OrbitPoint, b: OrbitPoint) -> float:
-        """The angle between the tangents, without that of such a corner."""
+        """The angle between the tangents, without the part that such a corner makes."""
         angle = super().turn(a, b)
         if not self.problem.passes_contact or self.norm(b.place - a.place) > 2.0 * STEPS.restart:
             return angle
@@ -112,17 +113,18 @@ class OrbitCurve(EquationCurve[OrbitPoint]):
         return OrbitCurve(problem, self.scales, self.symmetric)
 
     def known(self, unknowns: np.ndarray, values: np.ndarray) -> Corrected[Equations] | None:
-        """An orbit that is known to be one, with its equations evaluated; None where its motion cannot be followed."""
+        """An orbit whose unknowns are known, with its equations evaluated there; None where its motion cannot be followed."""
         place = np.concatenate([unknowns, values])
         equations = self.evaluate(place, thorough=True)
         return None if equations is None else Corrected(place, equations, 0)
 
 
 def _seen_from(a: OrbitPoint, b: OrbitPoint) -> OrbitPoint:
-    """A point with its tangent as it would be if the contact were passed before phase 0 as at a point beside it.
+    """The point b with the tangent that it would have if its orbit were, at phase 0, on the same side of the contact as a's.
 
-    Where an orbit passes the contact at phase 0 its state there has a corner, if the acceleration jumps with the velocity, as by
-    a damper: the instant moves by -dx/v, and the velocity by that times the jump. Nothing else of the orbit has one.
+    Where an orbit passes the contact just at phase 0, its curve has a corner if the acceleration jumps there, as by a damper on
+    one side: the instant of the passage moves by -dx/v, and the velocity at phase 0 by that times the jump. The corner is in the
+    unknowns alone, not in the orbit.
     """
     own = a.curve.problem.own
     first, second = (point.equations.ends[0, at.KINDS + 3 * own :] for point in (a, b))

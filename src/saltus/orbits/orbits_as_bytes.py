@@ -1,7 +1,7 @@
 """Orbits, special points and branches as bytes, and back, bit for bit: for other processes, and for stores.
 
-Only what cannot be computed again is kept: a system is its JSON, a problem its signature, a point its place and tangent, at which
-the equations are evaluated again. Bytes are read by a reader that makes saltus's own data and arrays, and calls nothing else.
+The bytes hold a system as its JSON, a problem as its signature, and a point as its place and tangent; the equations are evaluated
+again at this place. The reader makes only saltus's own data and arrays, and calls nothing else, so that bytes cannot run code.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ def as_bytes(found: Any) -> bytes:
 
 
 def from_bytes(content: bytes) -> Any:
-    """What `as_bytes` was given.
+    """The orbits, special points or branches that `as_bytes` has written.
 
     Raises
     ------
     ParameterError
-        Bytes of anything else.
+        The bytes are of anything else, or damaged.
     """
     try:
         return _OrbitReader(io.BytesIO(zlib.decompress(content))).load()
@@ -49,7 +49,7 @@ def from_bytes(content: bytes) -> Any:
 
 class _OrbitWriter(pickle.Pickler):
     def reducer_override(self, found: Any) -> Any:
-        """How what is found is made again: nothing that it has computed of itself is kept."""
+        """The function and the arguments that make an object again; properties that it has computed and cached are not kept."""
         if isinstance(found, System):
             return _system, (found.to_json(),)
         if isinstance(found, Problem):
@@ -67,7 +67,7 @@ class _OrbitWriter(pickle.Pickler):
 
 class _OrbitReader(pickle.Unpickler):
     def find_class(self, module: str, name: str) -> Any:
-        """saltus's data and NumPy's arrays, nothing else."""
+        """Find the classes of saltus's data and of NumPy's arrays, and refuse all others."""
         if module == __name__ and name in MAKERS:
             return MAKERS[name]
         if module.split(".")[0] == "numpy" and name in ARRAYS:

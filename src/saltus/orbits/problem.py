@@ -1,15 +1,16 @@
 """The boundary-value problem of a periodic orbit with a given signature, and its derivatives (see docs/method.md).
 
-Unknowns of an orbit with impacts are the phase phi_i = Omega t_i of each and the speed v_i at which its gap closes. Segment i is
-the smooth motion on its side from impact i, with the velocity that the reset gives, to impact i+1, whatever the sign of the
-gap w between them; the last one ends with the first impact, a period later. For each
+The unknowns of an orbit with impacts are, for each impact i, its phase phi_i = Omega t_i and the speed v_i at which the gap
+closes. Segment i is the smooth motion on its side from impact i, with the velocity that the reset gives, to impact i+1, whatever
+the sign of the gap w between them; the last segment ends with the first impact of the next period. The equations of each segment
+are
 
     w(t_{i+1}) / (t_{i+1} - t_i) = 0,        -w'(t_{i+1}) - v_{i+1} = 0,
 
-regular at v_i = 0 as well, where the signature changes. An orbit without impacts has the state at phase 0 as its unknowns and
-the state a period later as its equation. So has every orbit of a system whose contact is no singularity (`flow/regularity.py`):
-it is followed through all sides, and a grazing is an orbit like any other. A symmetric orbit is closed after half a period by
-its mirror image.
+which are regular also at v_i = 0, where the signature changes. The unknowns of an orbit without impacts are its state at phase 0,
+and the equation says that the state a period later is the same. Orbits of a system whose contact is no singularity
+(`flow/regularity.py`) have this equation too, whatever sides they pass through; grazing is then nothing special. The equations of
+a symmetric orbit cover half a period, after which it is its mirror image.
 """
 
 from __future__ import annotations
@@ -33,9 +34,10 @@ ORBIT_TOLERANCE = 1e-14  # of the segments' steps: the orbits are then exact to 
 
 @dataclass(frozen=True)
 class Equations:
-    """The problem at one point: the residual and its derivatives, in blocks of the segments, and what lies between the ends.
+    """The problem at one point: the residual and its derivatives, one block for each segment, and extremes along the segments.
 
-    Row block i of the Jacobian is `here[i]` in the unknowns of segment i and `there[i]` in those of the next one.
+    Block row i of the Jacobian has `here[i]` in the columns of the unknowns of segment i, and `there[i]` in those of the next
+    one.
     """
 
     residual: np.ndarray  # (n d,)
@@ -46,7 +48,7 @@ class Equations:
     extremes: np.ndarray  # (n, 4 + margins): extrema within each segment, by `HUMP`, ... of `segments.py`; empty if not asked for
 
     def jacobian(self, closing: float = 1.0) -> np.ndarray:
-        """The derivatives to the unknowns; with `closing` -1 of the problem whose perturbations change their sign each time."""
+        """The derivatives to the unknowns; with `closing` -1 for perturbations that change their sign each (half) period."""
         matrix = np.zeros((len(self.residual), len(self.residual)))
         self._fill(matrix, closing)
         return matrix
@@ -75,7 +77,7 @@ class Equations:
         return self._all
 
     def monodromy(self) -> np.ndarray:
-        """The chain of the segments' maps, from the first unknowns to those a (half) period later; inf at a grazing."""
+        """The product of the segments' maps: from the first unknowns to those a (half) period later; inf at a grazing."""
         chain = np.eye(self.here.shape[1])
         with np.errstate(all="ignore"):
             try:
@@ -88,27 +90,27 @@ class Equations:
 
 
 class Segments(NamedTuple):
-    """Smooth segments, as `follow_segments` of the flow takes them."""
+    """Smooth segments, in the form that the flow's `follow_segments` takes."""
 
-    spans: np.ndarray  # (n, 3): when each begins and ends, and the speed at which the gap closed before it
-    sides: np.ndarray  # (n, 2): the side before the impact with which it begins, 0 for none, and that along it
-    states: np.ndarray  # (n, 2 d): its first state, where it begins with no impact
+    spans: np.ndarray  # (n, 3): when each segment begins and ends, and the speed of the impact with which it begins
+    sides: np.ndarray  # (n, 2): the side before the impact with which it begins (0 without impact), and the side along it
+    states: np.ndarray  # (n, 2 d): its first state, if it begins without an impact
 
 
 class FollowedSegments(NamedTuple):
-    """The results of `follow_segments` for such segments."""
+    """The results of the flow's `follow_segments`."""
 
     ends: np.ndarray
     columns: np.ndarray  # the derivatives of the ends
     extremes: np.ndarray
-    rates: np.ndarray  # the sign of the gap's rate on each side
+    rates: np.ndarray  # the sign of the gap's derivative to the coordinate, on each side
 
 
 class Problem:
     """The equations of one signature of a system, as functions of the unknowns and of the parameters at `paths`."""
 
     stray: float = math.inf  # see `EquationCurve`
-    rounded: float = 0.0  # the largest residual that rounding may leave, where multipliers are large
+    rounded: float = 0.0  # the largest residual that rounding may leave; above 0 for problems with very large multipliers
 
     def __init__(self, system: System, signature: Signature, paths: tuple[str, ...] = (), tol: float = ORBIT_TOLERANCE) -> None:
         if system.load.frequency is None:
@@ -131,12 +133,12 @@ class Problem:
         self._settings, self._records = np.array([0.0, 0.0, tol]), record_table(system, [])
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickled and copied as what it is made from: compiled code is loaded again where it is read."""
+        """Pickle and copy the arguments only: compiled code is loaded again in the process that reads them."""
         return type(self), (self.system, self.signature, self.paths, self.tol)
 
     @cached_property
     def passes_contact(self) -> bool:
-        """Whether orbits are followed through a contact that is no singularity, whatever the parameters at `paths`."""
+        """Whether the contact is no singularity for any values of the parameters at `paths`, so that orbits pass through it."""
         if self.signature.sides or not self.system.model.sides:
             return False
         return contact_regularity(self._run.trace, tuple(self._values), self.paths) is ContactRegularity.CONTINUOUS
@@ -153,7 +155,7 @@ class Problem:
 
     @property
     def size(self) -> int:
-        """How many unknowns there are."""
+        """The number of unknowns."""
         return 2 * (len(self.signature.sides) or self.own)
 
     @property
@@ -191,7 +193,8 @@ class Problem:
 
     @cached_property
     def halved(self) -> Problem:
-        """The problem of the orbits that are their own images: closed after half a period, by the mirror image if it is odd."""
+        """The problem of the orbits that are their own images, over half a period: symmetric orbits if the period is odd, else
+        orbits of half the period."""
         own, odd = self.signature, bool(self.signature.period % 2)
         period = own.period if odd else own.period // 2
         sides, events = own.sides[: len(own.sides) // 2], own.events[: len(own.events) // 2]
@@ -202,26 +205,28 @@ class Problem:
         return (unknowns[::2], unknowns[1::2]) if self.signature.sides else (np.empty(0), np.empty(0))
 
     def touching_speed(self, unknowns: np.ndarray, equations: Equations) -> float:
-        """The least speed of the impacts without which the motion beside the orbit has no derivative; inf without such."""
+        """The least speed of the impacts at which the map loses its derivative if the speed vanishes; inf without such
+        impacts."""
         return float(self.impacts(unknowns, equations)[1].min(initial=math.inf))
 
     def pressing(self, unknowns: np.ndarray, equations: Equations) -> float:
-        """Below 0 there is no orbit, as a contact would open that is taken for closed; inf where none is."""
+        """A quantity that is negative if a contact that the equations take for closed would open; inf without closed contacts."""
         return math.inf
 
     def half_way(self, unknowns: np.ndarray, values: np.ndarray, equations: Equations) -> np.ndarray | None:
-        """Of an orbit without impacts its image half a period later less itself; None where its motion cannot be followed."""
+        """For an orbit without impacts, the difference of its image from itself; None where the motion cannot be followed."""
         found = self.halved.evaluate(unknowns, values)
         return None if found is None else found.residual
 
     def repeated(self, unknowns: np.ndarray) -> np.ndarray:
-        """The unknowns of an orbit with impacts over twice the time that the equations cover."""
+        """The unknowns of an orbit with impacts that goes round twice in the time that the equations of the doubled orbit
+        cover."""
         later = unknowns.copy()
         later[::2] += self.closing
         return np.concatenate([unknowns, later])
 
     def alternating(self, direction: np.ndarray) -> np.ndarray:
-        """A change of the unknowns as one of `repeated` ones, with the other sign in the second round."""
+        """A perturbation of the unknowns as one of the `repeated` unknowns, with the other sign in the second round."""
         return np.concatenate([direction, -direction])
 
     def evaluate(
@@ -229,8 +234,7 @@ class Problem:
     ) -> Equations | None:
         """The equations at a point, or None where the motion cannot be followed.
 
-        `later` are the unknowns at the end of the period, where others are asked for than at its beginning, as of a motion that
-        takes more than one period.
+        `later` are the unknowns asked for at the end of the period, if they differ from those at its beginning.
         """
         frequency, later = self.frequency(values), unknowns if later is None else later
         if not (frequency > 0.0 and all(np.isfinite(numbers).all() for numbers in (unknowns, later, values))):
@@ -281,7 +285,7 @@ class Problem:
         return np.array(list(zip(sides or (0,), along, strict=True)), dtype=np.int64)
 
     def _along(self) -> tuple[int, ...]:
-        """The side of each segment, 0 for all sides."""
+        """The side of each segment; 0 stands for all sides, where the contact is passed through."""
         return (0,) if self.passes_contact else self.signature.along()
 
     def _shooting(self, later: np.ndarray, frequency: float, followed: FollowedSegments) -> Equations:
@@ -308,7 +312,7 @@ class Problem:
 
 
 def _ready(system: System, paths: tuple[str, ...]) -> Any:
-    """The compiled structure with the tangent to the parameters and all of the model's margins."""
+    """The compiled program of a system with derivatives to the parameters at `paths`, and with all of the model's margins."""
     model = system.model
     side = (*model.sides, 1)[0]
     still: Any = 0.0 if len(model.coordinates) == 1 else (0.0,) * len(model.coordinates)

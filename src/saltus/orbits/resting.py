@@ -1,8 +1,8 @@
 """Periodic orbits that rest at the contact for a part of their period (losses at impact).
 
-Impacts die away in a finite time, the system rests, and the load alone fixes when it is released. So the motion after a release
-is the same whatever came before: an orbit is found by following the motion from release to release until one repeats, nothing
-has to be solved for, and its multipliers are 0.
+Impacts accumulate in a finite time, the system rests, and the load alone determines when it is released. The motion after a
+release therefore does not depend on what came before. An orbit is found by following the motion from release to release until
+one repeats; no equation has to be solved, and the multipliers are 0.
 """
 
 from __future__ import annotations
@@ -24,16 +24,18 @@ from saltus.orbits.symmetry import is_symmetric, keeps_symmetry
 from saltus.orbits.tolerances import TOLERANCES
 from saltus.systems import System
 
-INTO = 1e-3  # share of the first flight after a release before which the gap only opens, so that it is not searched for minima
+INTO = 1e-3  # share of the first flight after a release in which the gap only opens, and in which no minimum is looked for
 RELEASED, LANDED, SIDE = 0, 1, 2  # in `excursions`
 
 
 @dataclass(frozen=True, eq=False)
 class RestingOrbit(PeriodicOrbit):
-    """A periodic orbit with rest: from each release an excursion, impacts that die away, and rest up to the next release.
+    """A periodic orbit with rest: each release begins an excursion, which ends in an accumulation of impacts and rest up to the
+    next release.
 
-    It has all that a `PeriodicOrbit` has. Its impacts are those that the flow resolves before it jumps to rest; there are
-    infinitely many. `residual` is by how much the smooth segments from impact to impact miss what the event-driven flow found.
+    It has all properties of a `PeriodicOrbit`. Of its infinitely many impacts it lists those that the flow resolves before it
+    jumps to rest. `residual` is the largest difference between the smooth segments from impact to impact and the motion of the
+    event-driven flow.
 
     Attributes
     ----------
@@ -42,9 +44,9 @@ class RestingOrbit(PeriodicOrbit):
     solution
         Their solution.
     excursions
-        (n, 3) of the (half) period: when it is released, when it is at rest again, and the side it is released to.
+        For each release in the (half) period the time of the release, the time of rest, and the side it is released to, (n, 3).
     bends
-        (impacts,): the second derivative of the gap just before each; it is above 0 only for those that a grazing brings.
+        The second derivative of the gap just before each impact, (impacts,); it is positive only for impacts born at a grazing.
 
     Examples
     --------
@@ -74,7 +76,7 @@ class RestingOrbit(PeriodicOrbit):
 
     @property
     def release_sides(self) -> np.ndarray:
-        """The sides to which it does, (n,)."""
+        """The sides to which it is released, (n,)."""
         return self._over_period(SIDE).astype(int)
 
     @property
@@ -96,40 +98,42 @@ class RestingOrbit(PeriodicOrbit):
 
     @cached_property
     def pulls(self) -> np.ndarray:
-        """The largest contact acceleration after each release, (n,): 0 where the load only touches it, and it is lost."""
+        """The largest contact acceleration after each release, (n,); where it is 0 the load only just pulls, and the release is
+        lost beyond."""
         phases = self.releases * self.frequency
         return np.array([peak_near(self.system, int(s), phi) for s, phi in zip(self.release_sides, phases, strict=True)])
 
     @property
     def multipliers(self) -> np.ndarray:
-        """0 and 0: motions beside it come to rest before the next release, and are the same from then on."""
+        """0 and 0: neighbouring motions come to rest before the next release and coincide with the orbit from then on."""
         return np.zeros(2, dtype=complex)
 
     @property
     def touching(self) -> np.ndarray:
-        """The speeds of the impacts on which the gap opens already as it closes, as after a grazing."""
+        """The speeds of the impacts whose gap closes ever more slowly (its second derivative is positive), as those born at a
+        grazing do."""
         speeds: np.ndarray = self.solution.unknowns[1::2][self.bends > 0.0]
         return speeds
 
     @property
     def grazes(self) -> bool:
-        """Whether it touches the contact without speed, apart from the impacts that die away."""
+        """Whether it touches the contact without speed, apart from its accumulations of impacts."""
         return min(abs(self.clearance), float(self.touching.min(initial=math.inf))) < TOLERANCES.touch
 
     @property
     def stable(self) -> bool:
-        """True, unless a release is only touched, a rest has no duration or it grazes."""
+        """True, unless the load only just pulls at a release, a rest has no duration, or the orbit grazes."""
         return bool(self.pulls.min() > TOLERANCES.touch and self.rest_durations.min() > TOLERANCES.touch) and not self.grazes
 
     def start(self) -> dict[str, Any]:
-        """The arguments of `simulate` that start the motion: at its first release."""
+        """The arguments of `simulate` that start the motion at its first release."""
         model = self.system.model
         time, side = float(self.excursions[0, RELEASED]), int(self.excursions[0, SIDE])
         return {model.coordinates[0]: float(model.contact), "velocity": 0.0, "time": time, "side": side}
 
     @cached_property
     def defect(self) -> float:
-        """The largest distance between its states and those a period later, by direct simulation over two, at 64 instants."""
+        """The largest distance between states a period apart, at 64 instants of a direct simulation over two periods."""
         motion = self.motion(2 * self.period)
         times = motion.start + self.duration * (np.arange(64) + 0.5) / 64.0
         now, later = motion.at(times), motion.at(times + self.duration)
@@ -145,9 +149,10 @@ class RestingOrbit(PeriodicOrbit):
 
 
 def resting_near(base: Problem, motion: Motion, max_period: int) -> RestingOrbit | None:
-    """The resting orbit of up to `max_period` forcing periods on which a motion is after its last release; None if there is none.
+    """The resting orbit of up to `max_period` forcing periods that a motion follows after its last release; None if there is
+    none.
 
-    Its times are counted from its earliest release in a forcing period.
+    It begins at the one of its releases that is earliest in the forcing period.
     """
     last = motion.events.of(EventKind.RELEASE)
     release = _known(load_releases(base.system), last[-1].time, last[-1].side, base.system) if len(last) else None
@@ -188,7 +193,7 @@ def _released(system: System, release: Release, periods: float, dense: bool = Tr
 
 
 def _known(roots: tuple[Release, ...], time: float, side: int, system: System) -> Release | None:
-    """The load's release at an event's time."""
+    """The release of the load that coincides with an event at a time, modulo the forcing period; None without such."""
     period = system.load.period
     assert period is not None
 
@@ -200,7 +205,8 @@ def _known(roots: tuple[Release, ...], time: float, side: int, system: System) -
 
 
 def _orbit(base: Problem, chain: tuple[Release, ...], periods: int) -> RestingOrbit | None:
-    """The orbit that goes through a cycle of releases, by half of it where it is, and stays, its own mirror image."""
+    """The orbit that goes through a cycle of releases; it is given by its first half if it is symmetric and the system stays
+    so."""
     system, period = base.system, base.system.load.period
     assert period is not None
     first = chain[0]
@@ -223,7 +229,7 @@ def _orbit(base: Problem, chain: tuple[Release, ...], periods: int) -> RestingOr
 
 
 def _excursions(motion: Motion, first: Release, end: float, slack: float) -> np.ndarray | None:
-    """Releases, rests and sides of a motion that starts at a release and rests at `end`; None where it does not."""
+    """The times of release and rest, and the sides, of a motion that starts at a release; None if it does not rest at `end`."""
     releases, sides = [first.time], [first.side]
     for event in motion.events.of(EventKind.RELEASE):
         if first.time + slack < event.time < end - slack:
@@ -236,7 +242,7 @@ def _excursions(motion: Motion, first: Release, end: float, slack: float) -> np.
 
 
 def _between(problem: Problem, motion: Motion, excursions: np.ndarray) -> tuple[Equations | None, np.ndarray]:
-    """The equations of the impacts along the smooth segments between them, and the gap's second derivatives at impact."""
+    """The equations of the impacts along the smooth segments between them, and the gap's second derivatives at the impacts."""
     impacts, contact = motion.impacts, float(problem.system.model.contact)
     speeds = np.abs(impacts.velocity_before)
     opened = np.searchsorted(impacts.time, excursions[:, RELEASED])  # the first impact of each excursion

@@ -1,10 +1,10 @@
-"""A family of resting orbits along one parameter, through grazings, up to where its rests are no longer what they were.
+"""A family of resting orbits along one parameter, through grazings, up to where a rest appears or is lost.
 
-The multipliers are 0, so there is one orbit at each value of the parameter and the family never folds: it is followed by
-the parameter itself. It ends where a rest or a release is lost or a further one is born, at one of
+The multipliers are 0, so there is one orbit at each value of the parameter and the family never folds: the parameter itself is
+the coordinate along it. It ends where a rest or a release is lost or a new one is born, at one of
 
-* RL, a release that the load only touches (a double root of the contact acceleration): the excursion after it shrinks to rest;
-* CH, the impacts die away only at the instant of the next release: the rest before it has no duration.
+* RL: at a release the load only just pulls (a double root of the contact acceleration), and the excursion shrinks to rest;
+* CH: an accumulation of impacts ends just at the next release, and the rest before this release has no duration.
 """
 
 from __future__ import annotations
@@ -38,18 +38,18 @@ from saltus.orbits.special_point import OrbitEnd, SpecialKind, SpecialPoint, Use
 
 @dataclass(frozen=True)
 class RestingSettings:
-    """How the events of a family of resting orbits are told from rounding, and how long its steps are."""
+    """How the events of a family of resting orbits are told apart from rounding errors, and how long its steps are."""
 
     smallest: float = 1e-7  # amplitude below which an orbit is about to shrink to rest
     narrow: float = 1e-12  # width, relative to the parameter, within which the loss of a release is located
-    reach: float = 1e-9  # distance ahead, as a share of the range, from which on the loss of a release is looked for
-    behind: float = 0.05  # rad before a release, from where its peak is looked for as the parameter changes
-    brief: float = 1e-3  # rad of phase: a rest so short is the one that vanishes
+    reach: float = 1e-9  # the first distance ahead, as a share of the range, at which the loss of a release is looked for
+    behind: float = 0.05  # the peak of the pull is looked for from this phase before the release on, rad
+    brief: float = 1e-3  # rad of phase: the rest that vanishes at the end of a family is shorter than this at the last orbit
     faint: float = 1e-3  # speed and clearance below which a change of the impacts is a grazing
     change: float = 0.06  # the change of extrema (rad) and of the phases of releases and rests that a step aims at
     most_change: float = 0.2  # the largest such change that is accepted
     first_step: float = 0.1  # the first step as a share of the longest
-    short: float = 3e-6  # a step shorter than a millionth of the range is cut short by an end of the family
+    short: float = 3e-6  # the shortest step, a millionth of the range: if even this fails the family ends
 
 
 SETTINGS = RestingSettings()
@@ -71,7 +71,7 @@ class RestingPoint(Point):
 
 @dataclass(frozen=True, eq=False)
 class RestingCurve(NaturalCurve[RestingPoint]):
-    """The family beside an orbit: the orbits with its rests at values of the parameter nearby."""
+    """The family near an orbit: at nearby values of the parameter, the orbits with the same sequence of releases."""
 
     near: RestingOrbit
     path: str
@@ -83,7 +83,7 @@ class RestingCurve(NaturalCurve[RestingPoint]):
         return (self.bounds[1] - self.bounds[0]) / 3.0
 
     def at(self, value: float) -> RestingPoint | None:
-        """The orbit at a value nearby; None where its rests are others, or the motion cannot be followed."""
+        """The orbit at a nearby value; None if its sequence of releases is another one, or the motion cannot be followed."""
         try:
             found = _followed(self.near, self.path, value)
         except SaltusError:
@@ -91,12 +91,12 @@ class RestingCurve(NaturalCurve[RestingPoint]):
         return self.point(found) if found is not None and _itinerary(found) == _itinerary(self.near) else None
 
     def point(self, orbit: RestingOrbit, value: float | None = None) -> RestingPoint:
-        """An orbit as a point, at its own parameter or at a value next to it."""
+        """An orbit as a point, at its own value of the parameter unless another one next to it is given."""
         place = np.array([float(orbit.system.get(self.path)) if value is None else value])
         return RestingPoint(replace(self, near=orbit), place, np.array([self.scale]), 0, orbit)
 
     def turn(self, a: RestingPoint, b: RestingPoint) -> float:
-        """How much two orbits differ: in extrema, and in the phases of releases and rests."""
+        """The largest difference between two orbits in their extrema and in the phases of their releases and rests."""
         one, other = a.orbit, b.orbit
         phases = [np.concatenate([o.releases, o.rests]) * o.frequency for o in (one, other)]
         turned = np.abs((phases[1] - phases[0] + math.pi) % (2.0 * math.pi) - math.pi).max()
@@ -117,7 +117,8 @@ def first_point(orbit: RestingOrbit, path: str, bounds: tuple[float, float]) -> 
 
 
 def _followed(orbit: RestingOrbit, path: str, value: float, index: int = 0) -> RestingOrbit | None:
-    """The orbit that the motion from one of the releases leads to at a value of a parameter, through that release again."""
+    """The orbit at a value of a parameter that begins at the release which corresponds to release `index` of an orbit; None if
+    the release is lost, or if the motion does not come back to it."""
     system = orbit.system.with_({path: value})
     phase, side = orbit.releases[index] * orbit.frequency, int(orbit.release_sides[index])
     frequency = system.load.frequency
@@ -138,7 +139,7 @@ def _itinerary(orbit: RestingOrbit) -> tuple[int, bool, tuple[int, ...]]:
 
 
 def _shortest_rest(orbit: RestingOrbit) -> float:
-    """The phase of the shortest rest."""
+    """The duration of the shortest rest, as a phase."""
     return float(orbit.rest_durations.min() * orbit.frequency)
 
 
@@ -151,7 +152,8 @@ class RestingEvents(Events):
     name = "family"
 
     def cut(self, point: RestingPoint, ahead: RestingPoint) -> Cut | None:
-        """The orbit just beyond a change of the impacts that touch, which is a grazing if the touch has no speed."""
+        """The orbit just beyond a change of the number of `touching` impacts; it is a grazing if that impact has no speed
+        there."""
         count = len(point.orbit.touching)
         if count == len(ahead.orbit.touching):
             return None
@@ -171,7 +173,8 @@ class RestingEvents(Events):
         return orbit_tests(point.orbit, self.functions)
 
     def ended(self, run: Continuation, ahead: RestingPoint, cut: Cut | None) -> End | None:
-        """The end where the release is lost, ahead of an orbit that has all but shrunk to rest; None if the bound is before."""
+        """The end where the release is lost, looked for ahead of an orbit that has nearly shrunk to rest; None if a bound of the
+        parameter comes first."""
         if ahead.orbit.amplitude >= SETTINGS.smallest:
             return None
         from scipy.optimize import brentq
@@ -199,7 +202,7 @@ class RestingEvents(Events):
         return None
 
     def stalled(self, run: Continuation, point: RestingPoint, step: float) -> End:
-        """The end between an orbit and a value at which it is no more, by what lies beyond."""
+        """The end of a family from whose last point no step leads on, with its kind, which the orbit beyond the end tells."""
         curve = point.curve
         last, beyond = bisected(point, curve.ahead(point, step), lambda other: curve.turn(point, other) <= SETTINGS.most_change)
         run.points.append(last if point.tangent[-1] > 0.0 else last.turned())
@@ -216,7 +219,8 @@ class RestingEvents(Events):
 
 
 def _what_ends(last: RestingPoint, other: RestingOrbit | None) -> tuple[End, tuple[float, float, float]]:
-    """The end of a family at its last orbit, given the one beyond, and the test function before, after and there."""
+    """The end of a family, from its last orbit and the orbit beyond, with the test function before the end, after it and
+    there."""
     orbit, value = last.orbit, last.parameter
     rest = _shortest_rest(orbit)
     if rest < SETTINGS.brief:

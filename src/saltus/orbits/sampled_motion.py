@@ -1,4 +1,4 @@
-"""The steps of a motion at so many instants that extrema between them can be told."""
+"""A motion sampled so densely in each of its steps that all extrema can be found."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import numpy as np
 from saltus.flow import Motion, modes_of
 from saltus.systems import reactions, stick_margins
 
-SAMPLES = 33  # of each step, between which the least values are those of parabolas, to the fourth power of the distance
-NEWTON_STEPS = 4  # from the largest sample of a coordinate to its extremum, whose error each of them squares
-NARROWER = (0.3, 1e-3)  # shares of the distance of samples: so far beside its least value a force is looked at, in turn
-MOST_ORDER = 24  # of a step's series
-# Events nearer to each other than this share of the motion's duration have no order, and nothing is between them.
+SAMPLES = 33  # in each step; minima of parabolas through them have errors of the fourth power of their distance
+NEWTON_STEPS = 4  # from the largest sample of a coordinate to its extremum; each squares the error
+NARROWER = (0.3, 1e-3)  # distances between the instants at which a force is evaluated near its least sample, in those of samples
+MOST_ORDER = 24  # the highest order of a step's series
+# Events nearer to each other than this share of the motion's duration happen at one instant, and steps between them are left out.
 ONE_INSTANT = 1e-9
 
 SHARES = np.linspace(0.0, 1.0, SAMPLES)
@@ -27,12 +27,12 @@ BENDS = (ORDERS * (ORDERS - 1))[:, None] * SHARES ** np.maximum(ORDERS - 2, 0)[:
 
 @dataclass(frozen=True, eq=False)
 class SampledMotion:
-    """The steps of a motion with its states at even instants of each, its ends included: `position` is (coordinates, steps,
-    samples), and so are its derivatives."""
+    """The steps of a motion with the states at evenly spaced instants of each step, its ends included. `position`, `velocity` and
+    `acceleration` are (coordinates, steps, samples)."""
 
     motion: Motion
     series: np.ndarray
-    tau: np.ndarray  # (steps, samples): since the start of the step
+    tau: np.ndarray  # (steps, samples): the time since the start of the step
     time: np.ndarray
     position: np.ndarray
     velocity: np.ndarray
@@ -97,10 +97,11 @@ class SampledMotion:
         return {name: _least(np.broadcast_to(value, self.time.shape)) for name, value in values.items()}
 
     def nearest_touch(self) -> float:
-        """The least of the inner minima at which the motion all but changes its mode; inf where it has none.
+        """How near the motion comes to a further change of its mode: the least of the inner minima of the gaps of open contacts,
+        the speeds of sliding frictions, the reactions of closed contacts, and the forces that sticking frictions still lack to
+        slip.
 
-        They are those of the gaps of open contacts, of the speeds of what slides, of the reactions of closed contacts and of
-        what a friction that sticks could bear beyond its force. Of the last two the value just after an event counts too.
+        For reactions and sticking frictions the value just after an event counts too. inf without such minima.
         """
         model, names = self.motion.system.model, self.motion.system.model.coordinates
         closed, slides = modes_of(model, self.side)
@@ -124,10 +125,10 @@ class SampledMotion:
         return float(min(least))
 
     def _turning_of(self, course: np.ndarray, rates: np.ndarray, chosen: np.ndarray) -> float:
-        """The least value of series (steps, orders) where their rates turn from falling to rising within the chosen steps."""
+        """The least of the minima of series (steps, orders), where their rates turn from negative to positive in chosen steps."""
         low, high = rates[:, :-1], rates[:, 1:]
         turns = (low < 0.0) & (high >= 0.0) & chosen[:, None]
-        turns[self.begins, 0] = False  # there the value leaves 0, with rates that are 0 to rounding
+        turns[self.begins, 0] = False  # after an event the value leaves 0, and the sign of its rate is rounding
         step, sample = np.nonzero(turns)
         if not step.size:
             return np.inf
@@ -138,8 +139,8 @@ class SampledMotion:
         return _turned(course[step[least]], float(when[least]), np.array([begin[least], end[least]]))
 
     def _dip(self, steps: np.ndarray, chosen: list[np.ndarray], forces: Callable[..., list[Any]]) -> float:
-        """The least inner minimum of any of some forces over each stretch of its chosen steps, or the value just after the event
-        before it; `steps` are the numbers of these steps in the whole motion.
+        """The least inner minimum of any of several forces within stretches of successive chosen steps, or the force just after
+        the event with which a stretch begins, if that is less. `steps` are the numbers of the steps in the whole motion.
         """
         least, lowest, where = np.inf, np.inf, (0, 0, 0)
         for number, (values, mask) in enumerate(zip(self._forces(forces), chosen, strict=True)):
@@ -157,13 +158,13 @@ class SampledMotion:
         return min(least, lowest if lowest == np.inf else self._narrowed(*where, forces))
 
     def _forces(self, forces: Callable[..., list[Any]]) -> list[np.ndarray]:
-        """What `forces` of the systems gives along the samples, (steps, samples) each."""
+        """The forces that the function `forces` gives along the samples, each (steps, samples)."""
         q, v, _ = self._state()
         values = forces(self.motion.system.model, self.time, q, v, list(self.acceleration), self.motion.system.load)
         return [np.broadcast_to(np.asarray(value, dtype=float), self.time.shape) for value in values]
 
     def _narrowed(self, number: int, step: int, sample: int, forces: Callable[..., list[Any]]) -> float:
-        """The minimum of a force near a sample: of parabolas through three instants that lie ever closer together."""
+        """The minimum of a force near a sample, from parabolas through three instants that lie ever closer together."""
         middle, apart, least = float(self.tau[step, sample]), float(self.tau[step, 1]), np.inf
         for share in NARROWER:
             offset = share * apart
@@ -176,7 +177,7 @@ class SampledMotion:
 
 
 def _turned(c: np.ndarray, t: float, between: np.ndarray) -> float:
-    """The least value of a series, from an instant near it, by Newton's method on its slope."""
+    """The minimum of a series, by Newton's method on its slope from an instant nearby, within the times `between`."""
     orders = ORDERS[: len(c)]
     slope, bend = (c * orders)[1:], (c * orders * (orders - 1))[2:]
     for _ in range(NEWTON_STEPS):
@@ -187,7 +188,7 @@ def _turned(c: np.ndarray, t: float, between: np.ndarray) -> float:
 
 
 def _least(values: np.ndarray) -> float:
-    """The least of samples along steps (..., samples), between them as on parabolas."""
+    """The least value along samples (..., samples), with the minima of the parabolas through each three of them."""
     low, middle, high = values[..., :-2], values[..., 1:-1], values[..., 2:]
     bend, slope = high - 2.0 * middle + low, 0.5 * (high - low)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -28,11 +28,11 @@ if TYPE_CHECKING:
 class SearchSettings:
     """How long motions are followed, and which of their states may lead to orbits."""
 
-    settling: int = 200  # Number of forcing periods that motions are given to settle.
-    # Number of forcing periods at the beginning of each motion, and at its end, in which near returns are looked for.
+    settling: int = 200  # Number of forcing periods for which motions are followed to settle.
+    # Number of forcing periods, at the beginning of each motion and at its end, in which near returns are looked for.
     transient: int = 24
     still: float = 1e-6  # A motion that stays this near to the contact is at rest.
-    same_state: float = 1e-5  # A settled motion whose state is this near to a known one is on the same orbit.
+    same_state: float = 1e-5  # A settled motion with a state this near to one of a known orbit is on this orbit.
 
 
 SETTINGS = SearchSettings()
@@ -40,11 +40,11 @@ SETTINGS = SearchSettings()
 
 @dataclass(frozen=True)
 class Settled:
-    """What direct simulation has settled on, an array entry for each motion that has."""
+    """The periodic motions on which direct simulation has settled, one entry of each array for each of them."""
 
     value: np.ndarray  # of the parameter
-    period: np.ndarray  # forcing periods after which it repeats
-    highest: np.ndarray  # of the first coordinate over that time
+    period: np.ndarray  # forcing periods after which the motion repeats itself
+    highest: np.ndarray  # the first coordinate's largest value over that time
     lowest: np.ndarray
 
     @property
@@ -55,18 +55,18 @@ class Settled:
 
 @dataclass(frozen=True, eq=False)
 class Search(Result):
-    """What was found, and what was searched.
+    """The result of a search for orbits: the orbits, and the effort that was made.
 
     Attributes
     ----------
     system
-        What was searched.
+        The system that was searched.
     path
         The dotted path of the parameter.
     orbits
         The orbits that were found.
     values
-        Its values.
+        The values of the parameter at which the search was made.
     starts
         How many initial states there were at each value.
     max_period
@@ -76,11 +76,11 @@ class Search(Result):
     seed
         The seed of the initial states.
     unsettled
-        (values,): how many motions did not settle on an orbit of up to `max_period`: slow or chaotic.
+        How many motions did not settle on an orbit of up to `max_period`, as they are slow or chaotic, (values,).
     at_rest
-        (values,): how many came to rest.
+        How many motions came to rest, (values,).
     settled
-        The attractors as simulation shows them.
+        The periodic attractors as direct simulation shows them.
 
     Examples
     --------
@@ -102,7 +102,8 @@ class Search(Result):
     settled: Settled
 
     def to_xarray(self) -> xarray.Dataset:
-        """The orbits over `orbit`, counts of what did not settle or came to rest over `value`, what settled over `motion`."""
+        """The orbits over `orbit`, the numbers of unsettled and of resting motions over `value`, settled motions over
+        `motion`."""
         name = self.system.model.coordinates[0]
         unit, text = self.system.model.unit_of(name), f"max abs({name})"
         columns: dict[str, tuple[Any, ...]] = {
@@ -142,10 +143,10 @@ def search_orbits(
 ) -> Search:
     """Periodic orbits of up to `max_period` forcing periods at several values of a parameter, each once for each value.
 
-    Initial states are spread evenly (a sequence of low discrepancy) over a window of the states, as `find_attractors` takes it;
-    by default its half widths are 1.5 around the contact, or around 0 for a model without one. Motions that settle lead to the
-    attracting orbits. Returns of the motions near to where they were, on their way or in chaos, are first guesses for Newton's
-    method, which finds repelling ones, of up to `repelling` forcing periods (by default `max_period`; 0 looks for none).
+    Initial states are spread evenly (a sequence of low discrepancy) over a window of the states, as in `find_attractors`; by
+    default the window has half widths of 1.5 around the contact, or around 0 for a model without one. Motions that settle lead to
+    the attracting orbits. Where motions in a transient or in chaos come back near to an earlier state, Newton's method begins
+    and finds repelling orbits of up to `repelling` forcing periods.
 
     Parameters
     ----------
@@ -154,15 +155,15 @@ def search_orbits(
     path
         The dotted path of the parameter.
     values
-        Its values.
+        Its values at which to search.
     max_period
         The longest period, in forcing periods.
     starts
-        How many initial states at each value.
+        How many initial states there are at each value.
     window
         A pair (low, high) for each coordinate, then for each velocity; by default half widths of 1.5 around the contact.
     seed
-        Of the initial states.
+        The seed of the initial states.
     repelling
         The longest period of repelling orbits, by default `max_period`; 0 looks for none.
     progress
@@ -171,7 +172,7 @@ def search_orbits(
     Raises
     ------
     ParameterError
-        An unknown parameter, no values, an effort without meaning.
+        The parameter is unknown, there are no values, or another argument has no meaning.
 
     Examples
     --------
@@ -216,7 +217,7 @@ def search_orbits(
 
 
 def _follow(system: System, path: str, grid: np.ndarray, states: np.ndarray, max_period: int) -> tuple[Recurrence, Recurrence]:
-    """Motions from the same states at every value, a row for each: their first periods, and how they go on and settle."""
+    """Motions from the same states at every value, one row for each: their first forcing periods, and those until they settle."""
     kept = max(SETTINGS.transient, max_period + 1)
     parameters = {path: np.repeat(grid, len(states))}
     options: dict[str, Any] = {"parameters": parameters, "max_period": max_period, "kept": kept, "stop_early": False}
@@ -226,7 +227,7 @@ def _follow(system: System, path: str, grid: np.ndarray, states: np.ndarray, max
 
 
 def _moving(system: System, late: Recurrence, rows: np.ndarray) -> tuple[np.ndarray, int]:
-    """Which of these motions neither rest at the contact nor have ended, and how many rest."""
+    """Which of these motions go on without resting at the contact, and how many rest there."""
     assert late.extrema is not None
     alive = rows[np.isfinite(late.states[rows]).all(axis=(1, 2))]
     high, low = late.extrema[alive, :, 0].max(axis=1, initial=-np.inf), late.extrema[alive, :, 1].min(axis=1, initial=np.inf)
@@ -237,8 +238,8 @@ def _moving(system: System, late: Recurrence, rows: np.ndarray) -> tuple[np.ndar
 def _attracting(
     system: System, path: str, late: Recurrence
 ) -> tuple[list[PeriodicOrbit], list[tuple[int, float, float]], np.ndarray, int]:
-    """The orbits on which settled motions are, what simulation shows of each, their states at phase 0, and how many motions
-    have not settled."""
+    """The orbits of settled motions; period and extrema of each as simulated; their states at phase 0; and the number of motions
+    that have not settled."""
     found: list[PeriodicOrbit] = []
     seen: list[tuple[int, float, float]] = []
     known = np.empty((0, system.dimension))

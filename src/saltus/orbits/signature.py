@@ -29,10 +29,10 @@ class ModeChange:
 
 @dataclass(frozen=True, slots=True)
 class Signature:
-    """What distinguishes families of periodic orbits.
+    """The signature of a family of periodic orbits: all that stays the same along it.
 
-    `sides` is the side before each impact. A symmetric orbit is its own mirror image half a period later; then only the
-    impacts, or events, of the first half are listed, and the equations are those of the half.
+    A symmetric orbit is its own mirror image half a period later; only the impacts, or events, of its first half are listed, and
+    its equations cover this half.
 
     Attributes
     ----------
@@ -45,11 +45,11 @@ class Signature:
     side
         The side of an orbit without impacts.
     events
-        What opens and closes, in order, of an orbit with several contacts, in place of `sides`.
+        For an orbit with several contacts, in place of `sides`: its impacts and releases in order.
     closed
-        The contacts that such an orbit has closed if it has no events, as bits.
+        For such an orbit without events: the contacts that are closed all the time, as bits.
     section
-        The phase at which the state is given of an orbit that is followed as a whole motion; None for all others.
+        For an orbit that is followed through its events: the phase at which its state is the unknown. None for all others.
 
     Examples
     --------
@@ -67,12 +67,13 @@ class Signature:
 
     @property
     def impact_count(self) -> int:
-        """Impacts in one period of the orbit; 0 of one with a section, whose impacts may be countless."""
+        """The number of impacts in one period of the orbit; 0 if it has a section, as its impacts are not part of the
+        signature."""
         return (len(self.sides) + sum(event.is_impact for event in self.events)) * (2 if self.symmetric else 1)
 
     @property
     def span(self) -> float:
-        """Forcing periods that the equations cover: q, or q / 2."""
+        """The number of forcing periods that the equations cover: q, or q / 2 for a symmetric orbit."""
         return self.period / 2 if self.symmetric else float(self.period)
 
     def along(self) -> tuple[int, ...]:

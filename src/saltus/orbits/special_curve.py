@@ -1,4 +1,4 @@
-"""A curve of special points in two parameters: its equations, its points, what it ends with, and its dataset."""
+"""A curve of special points in two parameters: its equations, its points, its ends, and its dataset."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Conditioned:
-    """The equations of an orbit and the condition that singles it out, at one place."""
+    """The equations of an orbit and the condition of its special point, evaluated at one place."""
 
     equations: Equations
     condition_value: ConditionValue
@@ -43,13 +43,13 @@ class Conditioned:
 
 @dataclass(frozen=True, eq=False)
 class SpecialCurvePoint(OrbitPoint):
-    """A point of a curve of special points. Along a grazing its orbit has the impacts without speed of the other side."""
+    """A point of a curve of special points. On a curve of grazings, the orbit's signature has the impacts without speed."""
 
     condition_value: ConditionValue
 
     @property
     def condition(self) -> Condition:
-        """The condition as it is used for the next point."""
+        """The condition with which the next point is computed."""
         condition: Condition = self.curve.condition
         return condition
 
@@ -60,7 +60,7 @@ class SpecialCurvePoint(OrbitPoint):
 
     @property
     def touching(self) -> list[int]:
-        """The impacts without speed that a grazing consists of: a pair that meets, or one that turns the motion round."""
+        """The impacts without speed of a grazing: a pair that coincides, or, at a wall, a single one."""
         if not isinstance(self.condition, Slow):
             return []
         i, sides = self.condition.index, self.orbit.signature.sides
@@ -69,7 +69,8 @@ class SpecialCurvePoint(OrbitPoint):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ConditionedCurve(OrbitCurve):
-    """The orbits at which a condition holds, along two parameters. Each point has the condition bordered anew."""
+    """The orbits at which a condition holds, along two parameters. At each point the vectors that border the condition are
+    renewed."""
 
     condition: Condition
 
@@ -89,11 +90,11 @@ class ConditionedCurve(OrbitCurve):
         return SpecialCurvePoint(curve, found.place, tangent, found.iterations, found.evaluation.equations, value)
 
     def joins(self, other: Any) -> bool:
-        """Always: the condition is the same, whatever borders it."""
+        """Whether two points lie on one curve: always, as the condition is the same whatever vectors border it."""
         return True
 
     def along_condition(self, orbit: PeriodicOrbit) -> SpecialCurvePoint | None:
-        """The point near an orbit that nearly fulfils the condition; None if it is not found or cannot be followed."""
+        """The point of the curve near an orbit that nearly fulfils the condition; None if Newton's method does not find it."""
         known = self.known(orbit.solution.unknowns, orbit.solution.values)
         if known is None:
             return None
@@ -103,7 +104,7 @@ class ConditionedCurve(OrbitCurve):
 
 
 def without_condition(point: SpecialCurvePoint) -> OrbitPoint:
-    """A point as one of the curves of orbits along both parameters."""
+    """A point as an orbit alone, on the surface of orbits along both parameters."""
     return OrbitPoint(
         point.curve.with_problem(point.orbit.problem), point.place, point.tangent, point.iterations, point.equations
     )
@@ -119,13 +120,13 @@ class SpecialCurve(Result, Course[SpecialCurvePoint, SpecialPoint]):
     points
         The points in order, each with its `orbit` and its parameters.
     special
-        The special ones among them, each a `SpecialPoint`.
+        The codimension-two points, each a `SpecialPoint`.
     ends
-        Why it ends, at its first point and at its last one.
+        Why the curve ends at its first point and at its last one.
     missed
-        What was seen on the way and could not be located, each with its reason.
+        The points that were noticed on the way and could not be located, each with its reason.
     kind
-        What its points are: LP, PD, BPC or GR.
+        The kind of its points: LP, PD, BPC or GR.
     paths
         The dotted paths of both parameters.
 
@@ -158,7 +159,7 @@ class SpecialCurve(Result, Course[SpecialCurvePoint, SpecialPoint]):
         Raises
         ------
         ParameterError
-            A path that is not one of the two.
+            `path` is not one of the two parameters.
         """
         if path not in self.paths:
             raise ParameterError(

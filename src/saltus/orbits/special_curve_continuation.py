@@ -1,4 +1,4 @@
-"""Curves of special points in two parameters: the borders between regions with other numbers of orbits, or of other stability."""
+"""Curves of special points in two parameters: borders at which the number of orbits, or the stability of orbits, changes."""
 
 from __future__ import annotations
 
@@ -60,7 +60,8 @@ class CurveEvents(OrbitEvents):
         return curve_test(SpecialKind[f"{self.kind}_GR"], grazing if several else room)
 
     def cut(self, point: SpecialCurvePoint, ahead: SpecialCurvePoint) -> Cut | End | None:
-        """The cut where the orbit's events change, with the kind of that point; without one if only its section comes near."""
+        """The cut where the orbit's events change, with the codimension-two point there; without a special point where only an
+        event comes to its section."""
         found = super().cut(point, ahead)
         if not isinstance(found, Cut) or found.special is None or isinstance(point.condition, Slow):
             return found
@@ -76,14 +77,15 @@ class CurveEvents(OrbitEvents):
         return Cut(found.point, replace(found.special, kind=kind))
 
     def across(self, run: Continuation, cut: Cut) -> SpecialCurvePoint | End:
-        """The end at another change of events; from where one comes to the phase of the state the curve goes on from another."""
+        """The end at another change of events; or, where an event comes to the section, the same point at another section, from
+        which the curve goes on."""
         if cut.special is None:
             return _from_another_section(cut.point) or End(OrbitEnd.NO_SECTION, cut.point.parameter)
         reason = OrbitEnd.MEETS_CHANGE if cut.special.kind.endswith("SW") else OrbitEnd.MEETS_GRAZING
         return End(reason, cut.point.parameter, cut.special.kind)
 
     def ended(self, run: Continuation, ahead: Any, cut: Cut | None) -> End | None:
-        """The end of an orbit that has shrunk to rest, unless it is another grazing."""
+        """The end of an orbit that has shrunk to rest, unless the step ends at another grazing."""
         return super().ended(run, ahead, cut) if cut is None else None
 
     def tests(self, point: SpecialCurvePoint) -> Iterable[TestFunction]:
@@ -102,8 +104,8 @@ def continue_special(
 ) -> SpecialCurve:
     """The curve of LP, PD, BPC or GR through a special point of a branch, in the branch's parameter and a second one.
 
-    It is followed both ways, through cusps, until it closes, reaches a bound, meets another grazing or cannot go on. PD, BPC:
-    the orbits are those that lose their stability, not the ones born there.
+    It is followed both ways, through cusps, until it closes, reaches a bound, meets another grazing or cannot go on. At a PD or
+    BPC the curve has the orbits that lose their stability, not those that are born there.
 
     Parameters
     ----------
@@ -112,21 +114,22 @@ def continue_special(
     path
         Dotted path of the second parameter, such as "load.horizontal.amplitude".
     bounds
-        Its least and largest value; by default from a tenth to ten times what it is (from -1 to 1 for 0).
+        Its least and largest value; by default from a tenth to ten times its present value (from -1 to 1 if that is 0).
     first_bounds
-        Those of the branch's own parameter; by default as far to both sides as its branch was wide, or to a tenth.
+        The bounds of the branch's own parameter; by default as far to both sides as the branch's range was wide, but not below a
+        tenth of its present value.
     step
         The longest step, in the norm of `OrbitCurve`.
     most_points
-        Of each direction, after which the curve is given up, with that reason.
+        The number of points in each direction after which the curve ends, with this as its reason.
     progress
         Called with the share of the first range that has been seen and the values of both parameters.
 
     Raises
     ------
     ParameterError
-        Another kind of point, an unknown parameter or the branch's own, bounds that exclude the point, a second
-        parameter that takes away the symmetry which a BPC or a grazing on both sides rests on.
+        The special point is of another kind; the parameter is unknown, or the branch's own; the bounds exclude the point; or
+        the second parameter breaks the symmetry that a BPC, a PD or a grazing of a symmetric orbit needs.
 
     Examples
     --------
@@ -202,7 +205,7 @@ def _start(special: SpecialPoint, paths: tuple[str, str], limits: list[tuple[flo
 
 
 def _from_another_section(point: SpecialCurvePoint) -> SpecialCurvePoint | None:
-    """The same point with its orbit's state at a phase farther from all events, in the direction in which it was followed."""
+    """The same point with the section at a phase farther from all events, to be followed in the same direction as before."""
     condition, problem = point.condition, point.orbit.problem
     assert isinstance(condition, Singular)
     phase, state = section_of(point.orbit.motion(), point.orbit.frequency)
@@ -220,7 +223,7 @@ def _from_another_section(point: SpecialCurvePoint) -> SpecialCurvePoint | None:
 
 
 def _defined(special: SpecialPoint, paths: tuple[str, str]) -> tuple[PeriodicOrbit, Condition]:
-    """The orbit as a solution of the problem along both parameters, and the condition that singles it out."""
+    """The orbit as a solution of the problem along both parameters, and the condition of its special point."""
     kind, old, unknowns = special.kind, special.orbit.problem, special.orbit.solution.unknowns
     system, values = special.orbit.system, np.array([special.parameter, special.orbit.system.parameters[paths[1]]])
     symmetric = keeps_symmetry(system, paths[0]) and keeps_symmetry(system, paths[1])
@@ -260,16 +263,16 @@ def _evaluated(problem: Problem, unknowns: np.ndarray, values: np.ndarray) -> Pe
 
 
 def _touching(special: SpecialPoint) -> tuple[Signature, np.ndarray]:
-    """The signature with more impacts of the two that meet at a grazing, and the orbit's unknowns in it."""
+    """Of the two signatures that meet at a grazing the one with more impacts, and the orbit's unknowns in it."""
     point = special.point
-    if point.orbit.slowest < TOLERANCES.touch:  # then the touch is an impact of its own, whose gap has its minimum there too
+    if point.orbit.slowest < TOLERANCES.touch:  # the signature has an impact where the orbit touches, and the gap a minimum
         return point.orbit.signature, point.solution.unknowns
     problem, unknowns = inserted(point)
     return problem.signature, unknowns
 
 
 def _first_without_speed(problem: Problem, unknowns: np.ndarray) -> int:
-    """The impact without speed, of a pair the first."""
+    """The number of the impact without speed; of a pair, the first one."""
     phases, speeds = unknowns[::2], unknowns[1::2]
     slow = int(np.argmin(np.abs(speeds)))
     before = phases[slow] - phases[slow - 1] + (problem.closing if slow == 0 else 0.0)

@@ -12,9 +12,10 @@ UserFunction = Callable[[PeriodicOrbit], float]
 
 
 class SpecialKind(StrEnum):
-    """The kinds of special points; zeros of a model's margin or of a user's function have its name instead.
+    """The kinds of special points. The zero of a model's margin or of a user's function has the name of this function as its
+    kind.
 
-    Those of codimension 1 lie on branches, those of codimension 2 on curves of special points in two parameters.
+    Points of codimension 1 lie on branches, points of codimension 2 on curves of special points in two parameters.
 
     Examples
     --------
@@ -51,14 +52,14 @@ class SpecialKind(StrEnum):
     BPC_SW = "BPC-SW", "symmetry breaking where they change", 2
 
     def __new__(cls, code: str, description: str, codimension: int = 1) -> SpecialKind:
-        """A kind is its code."""
+        """A kind is equal to its code, a string."""
         kind = str.__new__(cls, code)
         kind._value_, kind.description, kind.codimension = code, description, codimension
         return kind
 
 
 class OrbitEnd(EndReason):
-    """The reasons for which branches of orbits and curves of special points end, besides those of any curve.
+    """The reasons why branches of orbits and curves of special points end, in addition to those of any curve (`CurveEnd`).
 
     Examples
     --------
@@ -111,7 +112,7 @@ class OrbitEnd(EndReason):
 
 
 class OrbitMissed(MissedReason):
-    """What may be wrong along a branch of orbits, besides what may be missed along any curve."""
+    """What may go wrong along a branch of orbits, in addition to what may be missed along any curve (`CurveMissed`)."""
 
     IMPOSSIBLE_PAIR = (
         "{kind} near {first}: a complex pair of multipliers has the modulus {detail}, although areas of states never grow "
@@ -120,7 +121,7 @@ class OrbitMissed(MissedReason):
 
 
 class SpecialPoint(Zero):
-    """A special point of a branch or of a curve, with its orbit and its evidence; its kind is one of `SpecialKind`, or a name.
+    """A special point of a branch or of a curve, with its orbit and its evidence.
 
     Attributes
     ----------

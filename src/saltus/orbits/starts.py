@@ -1,4 +1,4 @@
-"""Initial states: spread evenly over a window, where the contacts let the system be."""
+"""Initial states that are spread evenly over a window, on the side of the contacts on which the system can be."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ import numpy as np
 from saltus.systems import System
 from saltus.window import Window
 
-CLOSED_BELOW = 1e-13  # A gap that is open, and moves, by less than this is closed but for rounding.
+CLOSED_BELOW = 1e-13  # A contact is closed, up to rounding, if both its gap and its speed are smaller than this.
 
 
 @cache
 def even_steps(dimension: int) -> np.ndarray:
-    """Steps that cover a cube of so many dimensions d evenly: x^-1, x^-2, ..., of the root x of x^(d + 1) = x + 1."""
+    """The steps of a sequence that covers a cube of d dimensions evenly: x^-1, ..., x^-d, with the root x of x^(d + 1) = x +
+    1."""
     root = 2.0
     for _ in range(200):  # each halves the error at least
         root = (1.0 + root) ** (1.0 / (dimension + 1))
@@ -25,18 +26,19 @@ def even_steps(dimension: int) -> np.ndarray:
 
 
 def initial_states(system: System, count: int, window: Window, seed: int) -> np.ndarray:
-    """(count, d): coordinates and velocities spread over a window, as `within_window` lays them there."""
+    """Initial states spread evenly over a window, (count, d), placed by `within_window`."""
     offset = np.random.default_rng(int(seed)).random(len(window))
     steps = even_steps(len(window))
     return within_window(system, 2.0 * ((offset + np.arange(1, count + 1)[:, None] * steps) % 1.0) - 1.0, window)
 
 
 def within_window(system: System, points: np.ndarray, window: Window, shrunk: Any = 1.0) -> np.ndarray:
-    """The states (..., n, d) at points of the cube (-1, 1)^d laid over a window, drawn in towards the contact by a factor.
+    """The states (..., n, d) at points of the cube (-1, 1)^d, mapped to a window that is shrunk towards the contact by a factor.
 
-    Those beyond a contact are reflected at it. Where closed contacts leave some coordinates free, the starts take turns, by two:
-    all open, then with each choice of coordinates held at their nearest contacts, if these lie in the window. Motions with a
-    closed contact would otherwise have no starts, as they have no share of the window's volume.
+    States beyond a contact are reflected at it. For a model with several contacts the states alternate, in pairs, between those
+    with all contacts open and those with some, but not all, coordinates held at their nearest contacts, for each choice of
+    coordinates whose contacts lie in the window. Without this no motion would begin with a closed contact, because such states
+    have no share of the window's volume.
     """
     rest = rest_state(system)
     states = np.asarray((points * window.half + (window.centre - rest)) * shrunk + rest)
@@ -48,7 +50,8 @@ def within_window(system: System, points: np.ndarray, window: Window, shrunk: An
 
 
 def rest_state(system: System) -> np.ndarray:
-    """Where the system is at its contacts without speed, (d,); 0 without a contact, the middle between two of a coordinate."""
+    """The state at the contacts without speed, (d,); a coordinate is 0 without contacts, and in the middle between two of
+    them."""
     model, names = system.model, system.model.coordinates
     state = np.zeros(2 * len(names))
     if model.sides:
@@ -60,14 +63,14 @@ def rest_state(system: System) -> np.ndarray:
 
 
 def is_still(system: System, highest: np.ndarray, lowest: np.ndarray, within: float) -> np.ndarray:
-    """Whether motions with these extrema stay within a distance of one place of contact, or of 0 without one."""
+    """Whether motions with these extrema stay within a distance of the position of one contact, or of 0 without contacts."""
     model = system.model
     places = [float(contact.position) for contact in model.contacts] or [float(model.contact) if model.sides else 0.0]
     return np.asarray(np.any([np.maximum(np.abs(highest - place), np.abs(lowest - place)) <= within for place in places], axis=0))
 
 
 def on_this_side(system: System, states: np.ndarray) -> np.ndarray:
-    """States (..., d), changed in place: those beyond one of several contacts go to its mirror image."""
+    """States (..., d), changed in place: those beyond one of several contacts are reflected at it."""
     names = system.model.coordinates
     for contact in system.model.contacts:
         place, position = names.index(contact.coordinate), float(contact.position)
@@ -79,9 +82,9 @@ def on_this_side(system: System, states: np.ndarray) -> np.ndarray:
 
 
 def states_beside(system: System, states: np.ndarray, shifts: np.ndarray) -> np.ndarray:
-    """States (..., d) moved by shifts, where closed contacts stay closed and nothing goes beyond one.
+    """States (..., d) moved by shifts, such that closed contacts stay closed and no coordinate goes beyond a contact.
 
-    What then is open by no more than rounding is closed.
+    Contacts that are then open by no more than rounding are closed.
     """
     names, moved = system.model.coordinates, on_this_side(system, states + shifts)
     held = held_by_contacts(system, states)
@@ -95,9 +98,8 @@ def states_beside(system: System, states: np.ndarray, shifts: np.ndarray) -> np.
 
 
 def before_impacts(system: System, states: np.ndarray) -> np.ndarray:
-    """States (..., d) in which what is at one of several contacts and moves into it is short of it by one rounding.
-
-    That is the state just before its impact, which comes at once.
+    """States (..., d) in which every coordinate that is at one of several contacts and moves into it is moved back from it by one
+    rounding: the state just before the impact, which then happens at once.
     """
     names, moved = system.model.coordinates, states.copy()
     for contact in system.model.contacts:
@@ -108,7 +110,7 @@ def before_impacts(system: System, states: np.ndarray) -> np.ndarray:
 
 
 def held_by_contacts(system: System, states: np.ndarray) -> np.ndarray:
-    """Which of the variables of states (..., d) are those of coordinates at rest at a contact, (..., d)."""
+    """Which variables of states (..., d) belong to coordinates that are at rest at a contact, (..., d)."""
     names, held = system.model.coordinates, np.zeros(states.shape, dtype=bool)
     for contact in system.model.contacts:
         place = names.index(contact.coordinate)
@@ -118,7 +120,7 @@ def held_by_contacts(system: System, states: np.ndarray) -> np.ndarray:
 
 
 def _held(system: System, states: np.ndarray, window: Window) -> np.ndarray:
-    """States (..., n, d) of which some have coordinates held at contacts, by turns."""
+    """States (..., n, d) in which some coordinates are held at contacts, alternating as `within_window` says."""
     names, turn = system.model.coordinates, np.arange(states.shape[-2]) // 2
     bounds = np.asarray(window)
     reached: dict[int, list[float]] = {}

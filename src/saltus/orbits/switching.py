@@ -32,10 +32,10 @@ def switch_branch(
     step: float = STEP,
     both: bool = True,
 ) -> tuple[Branch, ...]:
-    """The branches that begin at a special point of another one.
+    """The branches that begin at a special point of another branch.
 
-    At a PD that of the doubled orbit; at a BPC those of the two unsymmetric orbits, mirror images of one another, or, where two
-    branches cross, the two halves of the other branch.
+    At a PD this is the branch of the doubled orbit. At a BPC these are the branches of the two unsymmetric orbits, which are
+    mirror images of one another, or, where two branches cross, the two halves of the other branch.
 
     Parameters
     ----------
@@ -44,12 +44,12 @@ def switch_branch(
     bounds, functions, step
         As for `continue_orbit`.
     both
-        Whether both of two mirror images are followed, which differ in nothing but their phase and sign.
+        Whether both of two branches of mirror images are followed, whose orbits differ in phase and sign only.
 
     Raises
     ------
     ParameterError
-        A special point where no branch begins.
+        No branch begins at this special point.
 
     Examples
     --------
@@ -114,7 +114,8 @@ def _along(point: OrbitPoint, problem: Problem, unknowns: np.ndarray, direction:
 
 
 def _crossing_branch(point: OrbitPoint) -> tuple[OrbitPoint | None, ...]:
-    """Where two branches cross: the direction in the two-dimensional kernel that is not the branch's own, both ways."""
+    """The two halves of the other branch at a crossing: both ways along the direction in the two-dimensional kernel that is
+    orthogonal to the branch's own."""
     curve = point.curve
     own = point.tangent * curve.weights
     kernel = np.linalg.svd(point.equations.derivatives() / curve.weights)[2][-2:]
@@ -127,7 +128,7 @@ def _crossing_branch(point: OrbitPoint) -> tuple[OrbitPoint | None, ...]:
 
 @dataclass(frozen=True)
 class Cascade(Result):
-    """Period doublings one after the other, and how fast they follow: the ratios tend to Feigenbaum's 4.6692.
+    """A cascade of period doublings, with the ratios of their distances, which tend to Feigenbaum's 4.6692.
 
     Attributes
     ----------
@@ -173,9 +174,10 @@ class Cascade(Result):
 
 
 def doubling_cascade(first: SpecialPoint, bounds: tuple[float, float], *, max_period: int = 32, step: float = STEP) -> Cascade:
-    """The period doublings that follow one, each on the branch born at the one before, up to `max_period` forcing periods.
+    """The period doublings that follow a first one, each on the branch born at its predecessor, up to `max_period` forcing
+    periods.
 
-    It ends early where a doubled branch has no further doubling within the bounds.
+    The cascade ends earlier if a doubled branch has no further doubling within the bounds.
 
     Parameters
     ----------
@@ -191,7 +193,7 @@ def doubling_cascade(first: SpecialPoint, bounds: tuple[float, float], *, max_pe
     Raises
     ------
     ParameterError
-        A special point that is no PD.
+        The special point is no PD.
 
     Examples
     --------

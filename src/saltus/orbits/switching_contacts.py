@@ -1,4 +1,4 @@
-"""Beyond the point at which an event of an orbit with several contacts appears or is lost: the signatures on the other side."""
+"""The signatures that an orbit with several contacts may have beyond a point at which one of its events appears or is lost."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Switching:
 
     @classmethod
     def at(cls, point: OrbitPoint) -> Switching:
-        """What is known of a point of a curve."""
+        """A point of a curve, with its equations and its events."""
         problem, equations = point.orbit.problem, point.solution.equations
         assert isinstance(problem, ContactProblem)
         assert isinstance(equations, ContactEquations)
@@ -53,13 +53,13 @@ class Switching:
         yield from self._touching()
 
     def _together(self) -> Iterator[list[Timed]]:
-        """Where two events that follow one another have come together."""
+        """The events beyond a point at which two successive events have come together."""
         events, n = list(self.events), len(self.events)
         symmetric = self.problem.signature.symmetric
         for i in range(n if n > 1 else 0):
             j = (i + 1) % n
             if symmetric and j == 0:
-                continue  # the second one is in the other half: see `from_next_event`
+                continue  # the second event lies in the other half: `from_next_event` makes them neighbours
             first, second = events[i], events[j]
             apart = second.phase - first.phase + (self.problem.closing if j == 0 else 0.0)
             if abs(apart) > TOLERANCES.switching:
@@ -67,10 +67,10 @@ class Switching:
             one, other = first.event, second.event
             if one.contact != other.contact:
                 before = self._before(i)
-                yield _changed(events, {i: None, j: second})  # what was released is opened by the impact
+                yield _changed(events, {i: None, j: second})  # the impact on the other contact opens this one
                 swapped = before ^ (1 << other.contact) if not other.is_impact or other.closed >> other.contact & 1 else before
                 yield _changed(events, {i: replace(second, phase=first.phase).leaving(swapped), j: first.leaving(other.closed)})
-            elif one.is_impact:  # it is closed for no time, or opens and closes at once
+            elif one.is_impact:  # it is closed for no time, or opens without speed and closes at once
                 yield _changed(events, {i: first.leaving(other.closed), j: None})
             else:
                 yield _changed(events, {i: None, j: None})
@@ -81,7 +81,8 @@ class Switching:
         return (event.image(self.problem.images) if i == 0 and self.problem.signature.symmetric else event).closed
 
     def _without_pull(self) -> Iterator[list[Timed]]:
-        """Where a contact is closed without a reaction at first, opens without a pull, or has lost its reaction at the end."""
+        """The events beyond a point at which a contact closes with no reaction or opens with no acceleration, or at which its
+        reaction has vanished at the end of a segment."""
         events, seen = list(self.events), self.equations.seen
         for s in range(len(events)):
             here = events[s]
@@ -97,14 +98,14 @@ class Switching:
                 yield [*events[: s + 1], Timed(release, phase), *events[s + 1 :]]
 
     def _without_speed(self) -> Iterator[list[Timed]]:
-        """Without an impact that has lost its speed."""
+        """The events without an impact that has lost its speed."""
         for i, timed in enumerate(self.events):
             slow = abs(self.equations.ends[i - 1, SegmentEnd.RATE]) < TOLERANCES.touch
             if timed.event.is_impact and slow and timed.event.closed == self._before(i):
                 yield _changed(list(self.events), {i: None})
 
     def _touching(self) -> Iterator[list[Timed]]:
-        """With the impact without speed where a gap touches 0, or the excursion of no duration where a reaction does."""
+        """The events with an additional impact where a gap touches 0, or with a release and an impact where a reaction does."""
         events, seen = list(self.events), self.equations.seen
         frequency = self.problem.frequency(self.point.solution.values)
         for place in (SegmentExtremes.GAP, SegmentExtremes.FORCE):
@@ -116,7 +117,7 @@ class Switching:
             new = [Timed(ModeChange(True, contact, closed), phase)]
             if place == SegmentExtremes.FORCE:
                 if bounces(self.problem.system, contact):
-                    continue  # its closings bounce, and die away: no equations yet
+                    continue  # the contact would bounce to rest after each closing, for which there are no equations yet
                 new = [Timed(ModeChange(False, contact, closed & ~(1 << contact)), phase), *new]
             yield [*events[:at], *new, *events[at:]]
 
@@ -133,7 +134,7 @@ class Switching:
         return None if state is None else (other, other.joined(state, phases))
 
     def _state_after(self, first: Timed) -> np.ndarray | None:
-        """The state of the orbit just after one of its events on the other side."""
+        """The state of the orbit just after the first of the events of the other side."""
         n = 2 * self.problem.own
         for timed, end in zip(self.events, self.equations.ends, strict=False):
             same = (timed.event.is_impact, timed.event.contact) == (first.event.is_impact, first.event.contact)
@@ -142,7 +143,7 @@ class Switching:
         return self._state_at(first.phase)
 
     def _state_at(self, phase: float) -> np.ndarray | None:
-        """The state at a phase of an orbit without events; of one with a single event that at the next phase 0."""
+        """The state at a phase of an orbit without events; for an orbit with a single event, the state at the next phase 0."""
         frequency, n = self.problem.frequency(self.point.solution.values), 2 * self.problem.own
         begin = self.events[0].phase if self.events else 0.0
         end = phase if not self.events else 2.0 * np.pi * np.ceil(begin / (2.0 * np.pi))
@@ -170,13 +171,13 @@ Cycle = tuple[ModeChange, ...]
 
 
 def cycle_of(signature: Signature) -> Cycle:
-    """The events of a signature, from the same one on wherever it begins."""
+    """The events in cyclic order, the same for signatures that differ only in the event with which their lists begin."""
     events = signature.events
     return min((events[i:] + events[:i] for i in range(len(events))), key=repr, default=())
 
 
 def begins_excursion(point: OrbitPoint) -> bool:
-    """Whether an excursion of no duration from a release begins at a point, where multipliers and tangents are of no orbit."""
+    """Whether a point has an excursion of no duration after a release: its multipliers and its tangent then have no meaning."""
     problem = point.orbit.problem
     if not isinstance(problem, ContactProblem) or not problem.signature.events:
         return False
@@ -192,7 +193,7 @@ def _changed(events: list[Timed], new: dict[int, Timed | None]) -> list[Timed]:
 
 
 def contact_change(point: OrbitPoint) -> SpecialKind:
-    """Whether an event of an orbit appears or is lost at a point by a grazing, or by a release or a closing."""
+    """The kind of the point at which an event appears or is lost: GR for a grazing, SW for a release or a closing."""
     orbit, here = point.orbit, Switching.at(point)
     joined = next(iter(here._together()), None) is not None
     return SpecialKind.SW if joined or orbit.pressing <= min(orbit.slowest, orbit.clearance) else SpecialKind.GR

@@ -1,7 +1,7 @@
-"""Along orbits that are followed through their events: where an event appears or is lost, and the orbits on the other side.
+"""Orbits that are followed through their events: where an event appears or is lost, and the orbits on the other side.
 
-The map over a period is smooth as long as the events are the same in the same order. Where they change it is continuous, with
-other derivatives on the other side, or with a jump. With dry friction the changes are the four sliding bifurcations
+The map over a period is smooth as long as the events and their order stay the same. Where they change, the map is continuous with
+other derivatives on the other side, or it jumps. With dry friction the changes are the four sliding bifurcations
 (M. di Bernardo, P. Kowalczyk, A. Nordmark, Physica D 170, 2002).
 """
 
@@ -28,49 +28,51 @@ from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.special_point import OrbitEnd, SpecialKind, SpecialPoint
 
 EventSequence = tuple[OrbitEvent, ...]
-TINY = float(np.finfo(float).tiny)  # less than 0 by this is beyond a change, where nothing else tells by how much
+TINY = float(np.finfo(float).tiny)  # replaces a distance of 0 before a change of events, to keep the test function negative there
 
 
 @dataclass(frozen=True)
 class OtherSideSettings:
-    """How orbits with other events are looked for beside one at which they change."""
+    """How orbits with other events are looked for beside an orbit at which its events change."""
 
-    # Distances at which the equations are evaluated to know them on the other side, tried in turn.
+    # Distances from the point at which the equations are evaluated to see the events on the other side, tried in turn.
     beside: tuple[float, ...] = (1e-9, 1e-8, 1e-7)
-    # Distances at which an orbit is solved for on the other side: there the next event to change must not come before.
+    # Distances from the point at which an orbit is solved for on the other side, tried in turn: at the least ones no further
+    # event has changed yet.
     probes: tuple[float, ...] = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
-    # The same distances where the map is a square root: nearer than the first of them rounding is large.
+    # Such distances, in the order in which they are tried, where the map has a square root: below 1e-4 rounding is large.
     steep_probes: tuple[float, ...] = (1e-4, 1e-3, 1e-5)
-    # Shares of such a distance before a change from which it is extrapolated where that is, how often at most, and the share of
-    # the square of the distance by which one begins beyond it.
+    # With a square root, the place of the change along a line is extrapolated by secants from two places before it, at these
+    # shares of a probe's distance, at most so many times. The search for an orbit begins beyond this place by `inside` times the
+    # square of the distance.
     approach: tuple[float, float] = (0.1, 0.01)
     secants: int = 8
     inside: float = 1e-3
-    near: float = 3.0  # How far from the point such an orbit may be, in these distances.
-    # Where the least of them led to none, the branch may turn round as soon: the first step is this many times the way to the
-    # orbit. A longer one goes over to the part beyond the fold.
+    near: float = 3.0  # How far from the point an orbit found at a probe may be, in units of the probe's distance.
+    # If the least probe leads to no orbit, the branch may fold just as near to the change: its first step is at most this many
+    # times the distance of the orbit that was found. A longer step would jump beyond the fold.
     first: float = 10.0
-    # Where the map is continuous its residual so near to an orbit is no larger than this, a square root included.
+    # Where the map is continuous, the residual at the distances `beside` is at most this, even with a square root.
     jump: float = 5e-3
-    fall: float = 10.0  # Orbits so many times as far from a change as the last one tell how far the rest of the way is.
-    rounded: float = 1e-10  # An orbit of a larger residual tells its rounding, not how far it is from a change.
-    doubt: float = 2.0  # The bracket of such a change, in units of that way.
-    together: float = 1e-2  # Events of two orbits beside one another that are nearer than this are the same.
-    refused: float = 10.0  # Steps ahead at which parameters are tried, where no step leads on.
-    standing: float = 1e-11  # What moves by less sticks for good: slips grow as the third power of their duration.
+    fall: float = 10.0  # The way to a change is extrapolated from orbits whose distances from it have at least this ratio.
+    rounded: float = 1e-10  # An orbit with a larger residual is not used for this: its distance from the change is rounding.
+    doubt: float = 2.0  # The bracket of such a change, in units of the extrapolated way.
+    together: float = 1e-2  # Events of two neighbouring orbits are the same if their times differ by less than this.
+    refused: float = 10.0  # Where no step leads on, parameters so many steps ahead are tried: the system may refuse them.
+    standing: float = 1e-11  # A motion smaller than this sticks for good: slips grow as the third power of their duration.
     slow: float = 1e-2  # The largest speed of an impact that has just appeared.
-    # An orbit farther than this from other events, with none beside it, is at no change: what was solved for between two orbits
-    # lies on two branches.
+    # An orbit that is farther than this from a change of events, and has no orbits with other events beside it, is at no change:
+    # the two orbits between which it was solved for lie on two branches.
     far: float = 1e-3
-    same: float = 0.01  # Share of such a distance within which two orbits at one value of the parameter are one.
-    along: float = 1e-6  # The distance along a branch over which the section's tangent is carried to another section.
+    same: float = 0.01  # Two orbits at one value of the parameter are the same within this share of a probe's distance.
+    along: float = 1e-6  # The distance to a second orbit on the branch, which gives the tangent at another section.
 
 
 SETTINGS = OtherSideSettings()
 
 
 def events_at(point: OrbitPoint) -> FollowedEvents:
-    """The events of an orbit."""
+    """The events of a point's orbit."""
     equations = point.equations
     assert isinstance(equations, FollowedEquations)
     assert equations.followed is not None
@@ -78,7 +80,8 @@ def events_at(point: OrbitPoint) -> FollowedEvents:
 
 
 def same_events(reference: OrbitPoint) -> TestFunction:
-    """How far an orbit is from having other events than a reference, or from an event at its section; below 0 where it has."""
+    """The test function of changes of events: how far an orbit is from having other events than a reference, or an event at its
+    section. It is negative where the events are others."""
     sequence = events_at(reference).sequence
 
     def value(point: OrbitPoint) -> float:
@@ -91,13 +94,13 @@ def same_events(reference: OrbitPoint) -> TestFunction:
 
 
 def change_at(zero: Zero, reference: OrbitPoint) -> Cut | End:
-    """The cut at a zero of `same_events`, with the kind of change; without a special point where none happens. An end where the
-    orbits beyond are none of the branch."""
+    """The cut at a zero of `same_events`, with a special point of the kind of change, or without one if nothing changes but the
+    section or an accumulation. An end if no change is located because the orbits beyond belong to another branch."""
     if _stands(zero.point):
         return Cut(zero.point, SpecialPoint(SpecialKind.AS, zero.point, zero.evidence))
     if _section_comes(zero.point):
         return Cut(zero.point, None)
-    parent = parent_of(zero.point)  # it changes alike in both of its halves, while those of its family change places
+    parent = parent_of(zero.point)  # both halves of an orbit that is its own image change at once: look at one of them
     here, before = (zero.point, events_at(reference)) if parent is None else (parent, events_at(parent))
     _, other = next(_beside(here, before.sequence), (None, None))
     if other is None and events_at(zero.point).distance > SETTINGS.far:
@@ -112,7 +115,8 @@ def change_at(zero: Zero, reference: OrbitPoint) -> Cut | End:
 
 
 def refused_beyond(point: OrbitPoint, step: float, bounds: Bounds) -> End | None:
-    """The end at parameters beyond which the system is refused, where that is why no step leads on; it may be a bound."""
+    """The end of a branch beyond which the system refuses the parameters; it is a bound if the refusal begins there. None if the
+    system accepts the parameters ahead, so that something else stops the steps."""
     ahead = point.parameters + SETTINGS.refused * step * point.tangent[-len(point.parameters) :]
     try:
         point.curve.problem.at(ahead)
@@ -123,8 +127,10 @@ def refused_beyond(point: OrbitPoint, step: float, bounds: Bounds) -> End | None
 
 
 def stalled_at(point: OrbitPoint, step: float, points: Sequence[OrbitPoint] = ()) -> Cut | End | None:
-    """The cut at the last one of a branch's points, beyond which no step leads, if events change there: the branch turns round or
-    ends. Where multipliers grow without end up to the change no orbit is solved for all the way: the rest is part of the bracket.
+    """The cut at the last point of a branch, beyond which no step leads, if events change there: the branch turns round or ends.
+
+    Where multipliers grow without bound towards the change, orbits cannot be solved for all the way to it; the rest of the way is
+    part of the bracket.
     """
     here = parent_of(point) or point
     _, beside = next(_beside(here, events_at(here).sequence), (None, None))
@@ -137,7 +143,7 @@ def stalled_at(point: OrbitPoint, step: float, points: Sequence[OrbitPoint] = ()
         if before.curve.joins(point.curve) and test.value(before) > SETTINGS.fall * max(known[-1][0], TINY):
             known.append((test.value(before), before.parameters))
     if len(known) > 1:
-        # what is told by an orbit whose residual rounding keeps large is its own rounding
+        # if rounding keeps the residual of the last orbit large, its distance from the change is not known: use earlier ones
         (near, place), (far, other) = known[1:3] if len(known) > 2 and point.residual > SETTINGS.rounded else known[:2]
         width = np.maximum(width, SETTINGS.doubt * np.abs(place - near / (far - near) * (other - place) - point.parameters))
     evidence = Evidence(point.residual, tuple(map(float, width)), value, there, value)
@@ -145,16 +151,17 @@ def stalled_at(point: OrbitPoint, step: float, points: Sequence[OrbitPoint] = ()
 
 
 def _stands(point: OrbitPoint) -> bool:
-    """Whether what may slide does not move but for rounding: it sticks, as it may anywhere near."""
+    """Whether a system with friction does not move, up to rounding: it sticks, and may do so at any position nearby."""
     orbit = point.orbit
     return bool(orbit.problem.system.model.frictions) and orbit.highest - orbit.lowest < SETTINGS.standing
 
 
 def beyond(cut: Cut, points: Sequence[OrbitPoint]) -> OrbitPoint | End:
-    """Where a branch of these points, the last one at a cut, goes on beyond it: with other events, or from another section."""
+    """The point with which a branch, whose last point is at a cut, goes on beyond it: with other events, or from another
+    section. Or the reason why it ends."""
     if _stands(cut.point):
         return End(OrbitEnd.STICKS, cut.point.parameter)
-    born = parent_of(cut.point) is not None  # at a change of its parent's events: rounding tells which ones it has
+    born = parent_of(cut.point) is not None  # at the parent's orbit rounding decides which events are found: exclude none
     sequence = None if born else events_at(cut.point).sequence
     if cut.special is not None and cut.special.kind == SpecialKind.CH:
         return End(OrbitEnd.REST_VANISHES, cut.point.parameter)
@@ -164,9 +171,11 @@ def beyond(cut: Cut, points: Sequence[OrbitPoint]) -> OrbitPoint | End:
 
 
 def other_events(point: OrbitPoint, sequence: EventSequence | None, points: Sequence[OrbitPoint] = ()) -> OrbitPoint | End:
-    """An orbit beside a point that has other events than these, if any, with the direction away from it; or why there is none.
+    """An orbit beside a point that has other events than `sequence`, with the direction away from the point; or why there is
+    none.
 
-    It is none of the branch of these points, as between two changes that are all but one it may lead back along itself.
+    Orbits of the branch itself (`points`) are excluded: between two changes that nearly coincide the search could find the way
+    back.
     """
     reason, detail, sides = OrbitEnd.NO_OTHER_EVENTS, "", list[tuple[np.ndarray, np.ndarray]]()
     curve = point.curve.with_problem(point.curve.problem)
@@ -194,11 +203,11 @@ def other_events(point: OrbitPoint, sequence: EventSequence | None, points: Sequ
 
 
 def _just_beyond(point: OrbitPoint, place: np.ndarray, way: np.ndarray, probe: float) -> np.ndarray | None:
-    """Where events have just changed on a line through a place, of the direction in which they do beside a point; None where that
-    is not known.
+    """The place just beyond the change of events on a line through `place`, in the direction `way` in which they change beside
+    the point; None if it cannot be found.
 
-    The orbits beyond may be as near to the change as the square of their distance from the point, as the map is a square root of
-    the way over it. Newton's method then converges only from between the change and the orbit.
+    Where the map has a square root, an orbit beyond may be as near to the change as the square of its distance from the point.
+    Newton's method then converges only if it begins between the change and this orbit.
     """
     axis = way / point.curve.norm(way)
     known = list[tuple[float, float]]()
@@ -214,17 +223,17 @@ def _just_beyond(point: OrbitPoint, place: np.ndarray, way: np.ndarray, probe: f
 
 
 def first_step(point: OrbitPoint, ahead: OrbitPoint) -> float:
-    """The longest first step from an orbit with other events than those of the point beside it, or with another section."""
+    """The longest first step beyond a change of events or of the section, from the first orbit `ahead` of it."""
     way = ahead.curve.norm(ahead.place - point.place)
     return SETTINGS.first * way if way > SETTINGS.near * SETTINGS.probes[0] else np.inf
 
 
 def jump_over(cut: Cut, following: OrbitPoint) -> SpecialPoint | None:
-    """The period doubling, or of a symmetric orbit the breaking of its symmetry, at a change at which multipliers jump over -1.
+    """The period doubling (for a symmetric orbit, the symmetry breaking) at a change of events where a multiplier jumps over -1.
 
-    At a grazing-sliding the map is continuous and its derivative is not. Where the numbers of multipliers below -1 on its two
-    sides are odd together, the doubled orbit begins there, none of which has the multiplier -1 (M. I. Feigin 1970; M. di
-    Bernardo, M. Feigin, S. Hogan, M. Homer, Chaos, Solitons and Fractals 10 (1999) 1881).
+    At a grazing-sliding the map is continuous and its derivative is not. If the numbers of multipliers below -1 on the two sides
+    add up to an odd number, the branch of the doubled orbit begins there, although no orbit has a multiplier of -1 (M. I. Feigin
+    1970; M. di Bernardo, M. Feigin, S. Hogan, M. Homer, Chaos, Solitons and Fractals 10 (1999) 1881).
     """
     if cut.special is None or cut.special.kind != SpecialKind.GS:
         return None
@@ -239,13 +248,14 @@ def jump_over(cut: Cut, following: OrbitPoint) -> SpecialPoint | None:
 
 
 def _zero_of_line(first: tuple[float, float], second: tuple[float, float]) -> float:
-    """Where a function is 0 that has two values at two places; nan where they are equal."""
+    """The zero of the straight line through two pairs (place, value); nan if the values are equal."""
     rise = second[1] - first[1]
     return second[0] - second[1] * (second[0] - first[0]) / rise if rise else np.nan
 
 
 def _lies_on(points: Sequence[OrbitPoint], ahead: OrbitPoint, same: float) -> bool:
-    """Whether an orbit is one of a branch of these points: solved for between them, it is no farther away than `same`."""
+    """Whether an orbit lies on the branch of these points: the branch, solved at its parameter, passes it no farther than
+    `same`."""
     begun, sequence = End(OrbitEnd.START), events_at(ahead).sequence
     course: Course[OrbitPoint, SpecialPoint] = Course(tuple(points), (), (begun, begun), ())
     for i, (a, b) in enumerate(pairwise(points)):
@@ -258,19 +268,20 @@ def _lies_on(points: Sequence[OrbitPoint], ahead: OrbitPoint, same: float) -> bo
 
 
 def _leads_away(point: OrbitPoint, ahead: OrbitPoint, probe: float) -> bool:
-    """Whether a solution is near where it was looked for, and its tangent leads on."""
+    """Whether a solution is near to where it was looked for, and its tangent leads away from the point."""
     chord = ahead.place - point.place
     return point.curve.norm(chord) < SETTINGS.near * probe and float(ahead.tangent @ (point.curve.weights**2 * chord)) > 0.0
 
 
 def _is_discontinuous(equations: FollowedEquations) -> bool:
-    """Whether a motion that begins all but on an orbit ends away from it."""
+    """Whether the map jumps: a motion that begins very near to an orbit ends away from it."""
     return bool(np.abs(equations.residual).max() > SETTINGS.jump)
 
 
 def _beside(point: OrbitPoint, sequence: EventSequence | None) -> Iterator[tuple[np.ndarray, FollowedEquations]]:
-    """Places beside a point with the equations there, not solved, where the events are others than these or come at other times:
-    one for each other sequence at each distance. What is held at the section stays so, as it does on all orbits near."""
+    """Places beside a point, with the equations evaluated there, where the events differ from `sequence` or the map jumps: one
+    place for each such sequence at each distance. State variables that are held at the section stay held, as on all nearby
+    orbits."""
     problem = point.curve.problem
     assert isinstance(problem, FollowedProblem)
     held = problem.held(point.solution.unknowns, problem.at(point.parameters))
@@ -289,19 +300,19 @@ def _beside(point: OrbitPoint, sequence: EventSequence | None) -> Iterator[tuple
 
 
 def events_of_equations(equations: FollowedEquations) -> FollowedEvents:
-    """The events, of equations that were evaluated thoroughly."""
+    """The events in equations that were evaluated with extremes."""
     assert equations.followed is not None
     return equations.followed
 
 
 def _section_comes(point: OrbitPoint) -> bool:
-    """Whether an event has come to the section of an orbit before any other change."""
+    """Whether a zero of `same_events` only means that an event has come to the section."""
     found = events_at(point)
     return found.section_distance - EVENTS.section_distance < min(found.distance, EVENTS.section_distance)
 
 
 def _from_another_section(point: OrbitPoint) -> OrbitPoint | None:
-    """The same orbit with its state at a phase farther from all events, and the tangent carried there."""
+    """The same orbit with its section at a phase farther from all events, and with its tangent there."""
     problem = point.orbit.problem
     assert isinstance(problem, FollowedProblem)
     phase, state = section_of(point.orbit.motion(), point.orbit.frequency)
@@ -311,7 +322,7 @@ def _from_another_section(point: OrbitPoint) -> OrbitPoint | None:
     first = PeriodicOrbit.near(moved, state, point.parameters)
     if near is None or first is None:
         return None
-    # in the same forcing period, or the tangent would lead from one state of the orbit to another one
+    # both states in the same forcing period: otherwise the tangent would lead from one state of the orbit to another state of it
     guess = problem.state_at(phase, near.solution.unknowns, near.parameters, first.solution.unknowns)
     second = None if guess is None else PeriodicOrbit.near(moved, guess, near.parameters)
     if second is None:
@@ -324,7 +335,7 @@ def _from_another_section(point: OrbitPoint) -> OrbitPoint | None:
 
 
 def kind_between(before: FollowedEvents, after: FollowedEvents) -> SpecialKind | None:
-    """What changes between two orbits beside one another; None where nothing does but the count of impacts that die away."""
+    """The kind of change between two neighbouring orbits; None if only the number of impacts of an accumulation changes."""
     kinds = [Counter(event.kind for event in found.sequence) for found in (before, after)]
     more = {kind: kinds[1][kind] - kinds[0][kind] for kind in {*kinds[0], *kinds[1]} if kinds[1][kind] != kinds[0][kind]}
     sticks, reversals = more.get(EventCode.STICK, 0), more.get(EventCode.REVERSAL, 0)
@@ -344,7 +355,7 @@ def kind_between(before: FollowedEvents, after: FollowedEvents) -> SpecialKind |
 
 
 def first_change(before: FollowedEvents, after: FollowedEvents) -> SpecialKind:
-    """What changes between two motions from one section that part: by the first event that one has and the other has not."""
+    """The kind of change at which two motions from one section part, by the first event that only one of them has."""
     for i in range(max(len(before.events), len(after.events))):
         here = [(found.times[i], found.events[i]) for found in (before, after) if i < len(found.events)]
         if len(here) == 2 and here[0][1] == here[1][1] and abs(here[0][0] - here[1][0]) < SETTINGS.together:

@@ -20,7 +20,9 @@ from saltus.systems import Constant, Harmonic, Load, Signal, System, check_syste
 
 @answered
 def is_symmetric(system: System) -> bool:
-    """Whether -theta(t + T/2) moves as theta(t) does: a mirrored load that is the load half a period later (errata 18).
+    """Whether the mirror image of every motion, half a forcing period later, is a motion too: -theta(t + T/2) for theta(t).
+
+    It is if the model has a mirror symmetry and the mirrored load is the load half a period later (errata 18).
 
     Parameters
     ----------
@@ -40,7 +42,7 @@ def is_symmetric(system: System) -> bool:
 
 
 def _half_a_period_later(one: Load, other: Load, name: str) -> bool:
-    """Whether a channel of a load is that of the other one half a period later; of the ground only its acceleration matters."""
+    """Whether a channel of one load is that of the other half a period later, up to a constant position of the ground."""
     first, second = _harmonics(one.channels[name]), _harmonics(other.channels[name])
     if first is None or second is None:
         return False
@@ -50,7 +52,7 @@ def _half_a_period_later(one: Load, other: Load, name: str) -> bool:
 
 
 def _harmonics(signal: Signal) -> dict[int, complex] | None:
-    """The complex amplitudes of a signal, by the order of the harmonic; None of one that has none."""
+    """The complex amplitudes of a signal, by the order of the harmonic; None for signals that are not harmonic."""
     if isinstance(signal, Constant):
         return {0: signal.value}
     if isinstance(signal, Harmonic):
@@ -81,7 +83,7 @@ def keeps_symmetry(system: System, path: str) -> bool:
 
 
 def half(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
-    """An orbit that is its own mirror image, as a solution of the equations of half its period; None where it is not."""
+    """An orbit that is its own mirror image, as a solution of the equations over half its period; None for other orbits."""
     problem, signature, unknowns = orbit.problem, orbit.signature, orbit.solution.unknowns
     n, odd = divmod(len(signature.sides) + len(signature.events), 2)
     if signature.symmetric or signature.period % 2 == 0 or odd:
@@ -113,7 +115,7 @@ def over_full_period(problem: Problem, unknowns: np.ndarray) -> tuple[Problem, n
 
 
 def full_point(point: OrbitPoint) -> OrbitPoint:
-    """A point with a symmetric orbit on the curve of the equations of its full period."""
+    """A point with a symmetric orbit, on the curve of the equations over its full period."""
     n = point.orbit.problem.size
     other, unknowns = over_full_period(point.orbit.problem, point.place[:n])
     _, ahead = over_full_period(point.orbit.problem, point.place[:n] + point.tangent[:n])
@@ -126,7 +128,7 @@ def full_point(point: OrbitPoint) -> OrbitPoint:
 
 
 def half_point(point: OrbitPoint) -> OrbitPoint:
-    """A point on the curve of the equations of half of its period, where its orbit and the system are symmetric; else itself."""
+    """A point on the curve of the equations over half its period, if its orbit and the system are symmetric; else the point."""
     orbit = half(point.orbit) if point.curve.symmetric else None
     if orbit is None:
         return point
@@ -138,8 +140,8 @@ def half_point(point: OrbitPoint) -> OrbitPoint:
 
 
 def full_period(orbit: PeriodicOrbit) -> PeriodicOrbit:
-    """A symmetric orbit as a solution of the equations of its full period."""
-    # It is not solved for again: where the symmetry breaks these equations are singular.
+    """A symmetric orbit as a solution of the equations over its full period."""
+    # Newton's method is not used: where the symmetry breaks these equations are singular.
     found = PeriodicOrbit.known(*over_full_period(orbit.problem, orbit.solution.unknowns), orbit.solution.values)
     assert found is not None, "a symmetric orbit can be followed over its full period"
     return found

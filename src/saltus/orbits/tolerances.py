@@ -1,4 +1,4 @@
-"""Within what orbits, impacts and instants are the same: all tolerances by which orbits are compared, with their reasons."""
+"""All tolerances with which orbits, impacts and instants are compared, with their reasons."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class OrbitTolerances:
-    """Differences below which two things are one."""
+    """Differences below which two things are the same."""
 
-    touch: float = 1e-9  # A gap or a speed below this is a grazing; grazings are located more precisely than that.
-    pair: float = 1e-4  # Two impacts vanish together whose phases and speeds differ by less: these go as a square root.
-    touching_state: float = 1e-7  # States a period apart where an orbit touches, which is known only to the square root.
+    touch: float = 1e-9  # A gap or a speed below this is 0, at a grazing; grazings are located more precisely than that.
+    pair: float = 1e-4  # Phases and speeds of two impacts that vanish together: they fall as a square root of the parameter.
+    touching_state: float = 1e-7  # States a period apart of an orbit that touches: they are known to the root of rounding only.
     grazing_orbits: float = 1e-5  # The unknowns of two orbits that coincide where both graze.
     same_orbit: float = 1e-6  # Extrema and speeds of impact of one orbit that was found twice.
-    image: float = 1e-6  # Rounding alone makes an orbit differ from its own image by less than this.
+    image: float = 1e-6  # An orbit and its own image: rounding alone makes a smaller difference.
     halves: float = 1e-7  # The halves of a symmetric orbit: solved to 1e-12, but near a grazing Newton's method leaves more.
-    switching: float = 1e-5  # Phases of two events of one contact that vanish together: their speeds go as the third power.
+    switching: float = 1e-5  # Phases of two events of one contact that vanish together: speeds fall as the third power of these.
     release: float = 1e-9  # Instants of a release, in forcing periods: releases are isolated, and known to rounding.
     load: float = 1e-12  # Values of a load and of its mirror image half a period later.
 

@@ -1,4 +1,4 @@
-"""Orbits compared with one another, and checked by direct simulation: many at once, in lanes."""
+"""Orbits compared with one another, and checked by direct simulation, many at once in lanes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from saltus.systems import System
 
 
 def same_orbit(a: PeriodicOrbit, b: PeriodicOrbit, mirrored: bool = True) -> bool:
-    """Whether two orbits of one system are the same, or mirror images; by their period, impacts, speeds and extrema."""
+    """Whether two orbits of one system are the same, or mirror images: if their periods, impact counts, speeds and extrema
+    agree."""
     if (a.period, a.signature.impact_count) != (b.period, b.signature.impact_count):
         return False
     one, other = np.array([a.highest, a.lowest]), np.array([b.highest, b.lowest])
@@ -27,7 +28,8 @@ def same_orbit(a: PeriodicOrbit, b: PeriodicOrbit, mirrored: bool = True) -> boo
 
 
 def _same_speeds(one: np.ndarray, other: np.ndarray) -> bool:
-    """Whether speeds in falling order are the same; where impacts die away rounding decides which is the last one."""
+    """Whether two lists of speeds in falling order agree; one may be longer by very slow impacts, since rounding decides which
+    impact of an accumulation is the last one that is listed."""
     n = min(one.size, other.size)
     last = np.append(one[n:], other[n:]).max(initial=0.0)
     return bool(np.abs(one[:n] - other[:n]).max(initial=0.0) < TOLERANCES.same_orbit and last < 2.0 * DYING)
@@ -35,24 +37,25 @@ def _same_speeds(one: np.ndarray, other: np.ndarray) -> bool:
 
 @answered
 def defects(orbits: list[PeriodicOrbit], rounds: int = 1, tol: float = 1e-13) -> np.ndarray:
-    """The distance of each orbit's state from itself after so many of its periods, by the event-driven flow, (n,).
+    """The distance of each orbit's state from itself after `rounds` of its periods, by the event-driven flow, (n,).
 
-    All must belong to one system but for its parameters along their common path, if they have one. A motion that starts after its
-    first impact ends with that impact, before or after it as rounding decides: the nearer counts.
+    All orbits must belong to one system, which may differ in the parameter along their common path, if they have one. An orbit
+    that starts after its first impact ends at this impact, and rounding decides whether before or after it: the smaller distance
+    counts.
 
     Parameters
     ----------
     orbits
         The orbits, n of them.
     rounds
-        How many of their periods.
+        After how many of their periods.
     tol
         The error that one step may make.
 
     Raises
     ------
     ParameterError
-        What is no orbit.
+        One of `orbits` is no orbit.
 
     Examples
     --------
@@ -67,8 +70,8 @@ def defects(orbits: list[PeriodicOrbit], rounds: int = 1, tol: float = 1e-13) ->
 
 
 def closing_rows(orbits: list[PeriodicOrbit], rounds: int = 1) -> np.ndarray:
-    """What `closing_distances` needs of each orbit, (n, m): the parameter along the common path, if there is one, coordinates and
-    velocities at the start, its time, the speed before its first impact (-1 without impacts), and the forcing periods."""
+    """One row for each orbit, (n, m), as `closing_distances` takes them: the parameter along the common path, if there is one,
+    coordinates and velocities at the start, its time, the speed before the first impact (-1 without), and the forcing periods."""
     rows = []
     for orbit in orbits:
         start, names = orbit.start(), orbit.system.model.coordinates
@@ -80,7 +83,7 @@ def closing_rows(orbits: list[PeriodicOrbit], rounds: int = 1) -> np.ndarray:
 
 
 def closing_distances(system: System, path: str | None, rows: np.ndarray, tol: float = 1e-13) -> np.ndarray:
-    """The distance of orbits from themselves some periods later, by rows as `closing_rows` gives them, (n,)."""
+    """The distance of each orbit's state from itself at the end of its motion, from rows that `closing_rows` gives, (n,)."""
     names, count = system.model.coordinates, len(system.model.coordinates)
     result = np.full(len(rows), np.inf)
     for periods in np.unique(rows[:, -1]):

@@ -1,4 +1,4 @@
-"""How a grid is cut into chunks."""
+"""The division of a grid into chunks."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-Index = tuple[int, ...]  # of a chunk: its place along each axis
-NAME = re.compile(r"[A-Za-z][\w.\-]*")  # of an axis, a dimension or a variable: it is a folder's name in a store
-MOST_CHUNKS = 1_000_000  # of a grid: each is a file, and all of them are looked for when a sweep begins
+Index = tuple[int, ...]  # the place of a chunk along each axis
+NAME = re.compile(r"[A-Za-z][\w.\-]*")  # the name of an axis, a dimension or a variable, which is a folder's name in a store
+MOST_CHUNKS = 1_000_000  # the most chunks of a grid: each is a file, and all of them are looked for when a sweep begins
 
 
 @dataclass(frozen=True)

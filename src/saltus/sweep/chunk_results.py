@@ -1,4 +1,4 @@
-"""One chunk: the function that computes it, what goes wrong in it, and what is asked of its result."""
+"""One chunk: the function that computes it, its errors, and the check of its result."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Arrays = dict[str, np.ndarray]
 
 @dataclass(frozen=True)
 class Failure:
-    """A chunk that failed: which, where in the grid, why, and how often it was tried.
+    """A chunk that failed, with its place in the grid, its last error, and the number of attempts.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Failure:
 
 @dataclass(frozen=True)
 class Raised:
-    """What a function raised, as strings: not every error can travel between processes."""
+    """The error that a function raised, as strings, because not every error can be sent between processes."""
 
     error: str
     traceback: str = ""
@@ -85,7 +85,7 @@ def resolve(function: str) -> Callable[[Any, dict[str, np.ndarray]], Mapping[str
 
 
 def attempt(function: str, arguments: Mapping[str, Any], block: dict[str, np.ndarray]) -> Any:
-    """What the function makes of a chunk, or what it raised. Runs in whichever process computes."""
+    """The result of the function for a chunk, or the error that it raised. Called in the process that computes."""
     try:
         # A function that changes its arguments must not change those of the next chunk.
         return resolve(function)(copy.deepcopy(arguments), block)
@@ -99,7 +99,7 @@ def checked(plan: Plan, index: Index, result: Any) -> Arrays:
     Raises
     ------
     ParameterError
-        No mapping, a variable missing or too many, a wrong shape, or values that the variable's type cannot hold.
+        The result is no mapping, has a variable too few or too many, a wrong shape, or values that a variable's type cannot hold.
     """
     where = f"{plan.function} returned for chunk {'/'.join(map(str, index))} ({plan.place(index)})"
     if not isinstance(result, Mapping):

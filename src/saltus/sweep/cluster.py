@@ -1,6 +1,6 @@
 """Chunks computed by the workers of a Dask cluster.
 
-Results travel to this process, which writes them: the machines need no disk in common, and only one process ever writes.
+Results are sent to this process, which writes them: the machines need no common disk, and only one process ever writes.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from saltus.sweep.plan import Plan
 
 @dataclass(frozen=True)
 class ClusterSettings:
-    """How long a cluster is waited for, and how much it is given at once."""
+    """How long to wait for a cluster, and how many chunks it gets at once."""
 
-    patience: float = 5.0  # The time for the scheduler to answer, and again for it to have a worker, s.
-    poll: float = 0.01  # The time between two looks at whether a chunk has come, or an interrupt, s.
-    ahead: int = 2  # Chunks for each of the cluster's threads: one in work, one waiting; more would only fill memory.
+    patience: float = 5.0  # The time given to the scheduler to answer, and again to have a worker, s.
+    poll: float = 0.01  # The time between two checks for results and interrupts, s.
+    ahead: int = 2  # Chunks for each of the cluster's threads: one in work and one waiting; more would only fill memory.
 
 
 CLUSTER = ClusterSettings()
 
 
 def on_cluster(plan: Plan, queue: deque[Index], address: str) -> Iterator[tuple[Index, Any]]:
-    """Compute the chunks in the queue on the cluster at `address`, and give what became of each as it comes.
+    """Compute the chunks in the queue on the cluster at `address`, and yield the outcome of each as it comes.
 
     A chunk whose worker dies is given to another by the scheduler. The workers need saltus and the plan's function, in the same
     versions as here.
@@ -53,7 +53,7 @@ def on_cluster(plan: Plan, queue: deque[Index], address: str) -> Iterator[tuple[
                 raise_if_interrupted()
                 while queue and len(flying) < max(CLUSTER.ahead, CLUSTER.ahead * sum(client.nthreads().values())):
                     index = queue.popleft()
-                    # Not pure: Dask would keep what a failed chunk raised, and not try it again.
+                    # Not pure: otherwise Dask would keep the error of a failed chunk, and not try it again.
                     future = client.submit(attempt, plan.function, plan.arguments, plan.block(index), pure=False)
                     flying[future.key] = index
                     done.add(future)
@@ -61,7 +61,7 @@ def on_cluster(plan: Plan, queue: deque[Index], address: str) -> Iterator[tuple[
                     raise_if_interrupted()
                     time.sleep(CLUSTER.poll)
                 future, result = next(done)
-                if isinstance(result, BaseException):  # the status may be that of a worker lost since, the result is not
+                if isinstance(result, BaseException):  # the status may be out of date if a worker was lost; the result is not
                     raise OSError("the task was given up")
                 yield flying.pop(future.key), Raised(_reason(result)) if future.status == "error" else result
                 del future, result  # so that the cluster forgets them
@@ -95,7 +95,7 @@ def _connect(address: str) -> Any:
 
 
 def _reason(result: Any) -> str:
-    """What went wrong on the cluster itself, such as a chunk whose workers died again and again."""
+    """An error of the cluster itself in words, such as a chunk whose workers died repeatedly."""
     error = result[1] if isinstance(result, tuple) else result
     return f"{type(error).__name__}: {_first_line(error)}"
 

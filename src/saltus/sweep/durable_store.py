@@ -11,11 +11,11 @@ from saltus.files import write_durably
 
 
 class DurableStore(LocalStore):
-    """A folder in which every file is brought to the disk before it has its name.
+    """A folder in which every file is flushed to the disk before it gets its name.
 
-    Zarr's own store also writes a file under another name and renames it, but does not wait for the disk: after a power failure a
-    name may stand without its content, while here a name means that the chunk is done. What a killed run leaves half-written has
-    a name here by which it is found.
+    Zarr's own store also writes a file under another name and renames it, but does not wait for the disk, so that after a power
+    failure a name may stand without its content. Here a name means that the chunk is done. Files that a killed run has left
+    half-written have names by which they are found.
     """
 
     async def set(self, key: str, value: Buffer) -> None:

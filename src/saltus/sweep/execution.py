@@ -1,4 +1,4 @@
-"""Running a plan: what is missing is computed, somewhere, and written here."""
+"""The execution of a plan: missing chunks are computed here, in other processes or on a cluster, and written by this process."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 Outcomes = Iterator[tuple[Index, Any]]
 
-NOTE_EVERY = 1.0  # s: the list of failures is not written more often than that
+NOTE_EVERY = 1.0  # the least time between two writes of the list of failures, s
 
 log = logging.getLogger("saltus.sweep")
 
@@ -119,7 +119,7 @@ def run(
 
 
 class _SweepRun:
-    """One run: the queue of missing chunks, the failures, and since when it computes."""
+    """One run of a plan: the queue of missing chunks, the failures, and the progress."""
 
     def __init__(self, plan: Plan, results: Store | MemoryResults, progress: Progress, retries: int) -> None:
         self.plan, self.results, self.progress, self.retries = plan, results, progress, retries
@@ -130,7 +130,7 @@ class _SweepRun:
         self.noted = -NOTE_EVERY
 
     def fill(self, workers: int | Workers | None, scheduler: str | None) -> None:
-        """Compute and write until nothing is left that may be tried."""
+        """Compute and write chunks until none is left that may be tried."""
         self.start = time.monotonic()
         self._report_progress()
         if not self.queue:
@@ -172,7 +172,7 @@ class _SweepRun:
         self._save_failures()
 
     def _save_failures(self) -> None:
-        """Write the list of failures, which may be long, if the last time is long enough ago."""
+        """Write the list of failures, which may be long, unless it was written only just before."""
         if time.monotonic() - self.noted > NOTE_EVERY:
             self.results.note(self.failures.values())
             self.noted = time.monotonic()
@@ -185,7 +185,7 @@ class _SweepRun:
 
 
 def _outcomes(plan: Plan, queue: deque[Index], workers: int | Workers | None, scheduler: str | None) -> Any:
-    """Take chunks from the queue until it is empty, and give what became of each, in any order."""
+    """Take chunks from the queue until it is empty, and yield the outcome of each, in any order."""
     if scheduler is not None:
         from saltus.sweep.cluster import on_cluster
 
@@ -209,12 +209,12 @@ def _here(plan: Plan, queue: deque[Index]) -> Outcomes:
 
 
 def check_run(store: Any, workers: Any, scheduler: Any, progress: Any) -> Path | None:
-    """The path of the store, if what says where chunks are kept and who computes them has a meaning.
+    """Check the arguments that say where chunks are kept and who computes them; returns the path of the store.
 
     Raises
     ------
     ParameterError
-        It has none.
+        One of them has no meaning.
     """
     if workers is not None:
         check_count("workers", getattr(workers, "count", workers), 1)

@@ -10,10 +10,10 @@ from typing import Any
 
 @contextmanager
 def deferred_interrupts() -> Iterator[Callable[[], None]]:
-    """Within it an interrupt (Ctrl-C) raises nothing; the function that is given raises KeyboardInterrupt if there was one.
+    """A context in which Ctrl-C raises nothing at once; the function that it yields raises KeyboardInterrupt if there was one.
 
-    Python raises it wherever the main thread happens to be: in a destructor of another library, where it is lost, or halfway
-    through one of its locks. Outside the main thread signals do not arrive, and nothing changes.
+    Python would raise it wherever the main thread happens to be: in a destructor of another library, where it is lost, or while a
+    lock is being taken. Outside the main thread signals do not arrive, and the context changes nothing.
     """
     seen: list[int] = []
 

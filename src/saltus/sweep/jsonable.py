@@ -1,4 +1,4 @@
-"""What is kept as JSON: checked before it is, and compared when it is read."""
+"""Values that are kept as JSON: the check before they are written, and their comparison when they are read."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import numpy as np
 
 from saltus.errors import ParameterError
 
-QUOTED = 60  # characters of a value in a sentence
-DIGEST = re.compile(r"[0-9a-f]{20,}")  # of which a reader learns only that it has changed
+QUOTED = 60  # the most characters of a value that a message shows
+DIGEST = re.compile(r"[0-9a-f]{20,}")  # messages say that a digest has changed, but do not show it
 
 
 def as_json(value: Any, place: str) -> Any:
@@ -22,7 +22,7 @@ def as_json(value: Any, place: str) -> Any:
     Raises
     ------
     ParameterError
-        Something that JSON does not have; `place` and the keys below it say where.
+        There is a value that JSON does not have; `place` and the keys below it say where.
     """
     if isinstance(value, np.generic):
         value = value.item()
@@ -51,7 +51,7 @@ def one_line(value: Any) -> str:
 
 
 def differences(there: Any, here: Any, place: str = "") -> Iterator[str]:
-    """What differs between two JSON values, entry by entry; strings that are JSON themselves are compared entry by entry too."""
+    """Sentences about the differences of two JSON values, entry by entry, also within strings that are JSON themselves."""
     there, here = _parsed(there), _parsed(here)
     if isinstance(there, dict) and isinstance(here, dict):
         for key in dict.fromkeys([*there, *here]):

@@ -1,4 +1,4 @@
-"""A sweep that is kept in memory: the same as a store, without files."""
+"""The results of a sweep in memory, with the interface of a store."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class MemoryResults:
             array[cut] = values[name]
 
     def note(self, failures: Iterable[Failure]) -> None:
-        """Does nothing: a list of failures in memory has no readers while the sweep runs."""
+        """Do nothing: in memory, nobody could read a list of failures while the sweep runs."""
 
     def dataset(self) -> xarray.Dataset:
         """The dataset of all chunks that were computed."""

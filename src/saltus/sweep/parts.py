@@ -1,8 +1,9 @@
-"""Parts of a search that decides by what it finds what it computes next: each row of them is computed once and remembered.
+"""Parts of a search whose next computations depend on its results so far: each part is computed once and remembered.
 
-Such a search has no plan of its own, but what takes long in it are pure functions of JSON, computed for many inputs at once. Each
-such call is a sweep of its own whose chunks are kept in a folder that is named by a digest of what is computed. A search that was
-stopped runs again, and finds what it had; another search of the same folder finds what they have in common.
+Such a search has no plan, but its long computations are pure functions of JSON, called for many inputs at once. Each such call is
+a sweep of its own, whose chunks are kept in a folder that is named by a digest of the computation. A search that was stopped runs
+again from its beginning and finds the parts that it had; another search in the same folder finds the parts that both have in
+common.
 """
 
 from __future__ import annotations
@@ -27,15 +28,15 @@ from saltus.sweep.store_status import StoreStatus, status
 if TYPE_CHECKING:
     from saltus.sweep.workers import Workers
 
-END = b"\n"  # of a text, which may itself end with the zeros with which rows are filled up
+END = b"\n"  # marks the end of a text, which may itself end with zeros, as rows are padded with zeros
 PARTS = "parts"  # the folder of a store in which its parts are kept
 
 
 @dataclass(frozen=True)
 class PartsSettings:
-    """When other processes are worth their beginning."""
+    """When it pays to start other processes."""
 
-    # Seconds for which this process computes what others could, before they are begun: each takes some to load what it needs.
+    # Seconds for which this process computes alone before others are started, each of which needs some time to load its code.
     patience: float = 4.0
 
 
@@ -44,10 +45,10 @@ SETTINGS = PartsSettings()
 
 @dataclass(frozen=True)
 class Part:
-    """A kind of parts: which function computes it, and the row of numbers that it gives for each input.
+    """A kind of parts: the function that computes them, and the row of numbers that it gives for each input.
 
-    The function is that of a `Plan`: `arguments["inputs"]` has all inputs, `block["row"]` says which of them are meant, and it
-    returns {"result": array (rows, width)}.
+    The function is called as that of a `Plan`: `arguments["inputs"]` has all inputs, `block["row"]` the numbers of those to
+    compute, and it returns {"result": array (rows, width)}.
     """
 
     name: str
@@ -55,7 +56,7 @@ class Part:
     width: int
     chunk: int  # rows that are computed together
     dtype: str = "f8"  # "u1" for text, filled up with zeros
-    threaded: bool = True  # whether it uses all cores itself, so that it is left to this process where there is no cluster
+    threaded: bool = True  # whether it uses all cores itself; then no further processes are started for it
 
 
 class Parts:
@@ -71,14 +72,14 @@ class Parts:
         self.common = dict(common)  # arguments of all functions
         self.folder = None if store is None else store / PARTS
         self.workers, self.scheduler = workers, scheduler
-        self.spent = 0.0  # s on what other processes could compute
+        self.spent = 0.0  # seconds spent on parts that other processes could compute
         self.known: dict[str, tuple[Any, np.ndarray]] = {}  # each input with its row, by the kind and a digest of the input
         for found in parts_of(store) if store is not None else ():
             if found.complete:
                 self._remember(found.path)
 
     def rows(self, part: Part, inputs: Sequence[Any], progress: Progress = silent) -> list[np.ndarray]:
-        """The row of numbers of each input; only those that are not known are computed."""
+        """The row of numbers for each input; only rows that are not known are computed."""
         keys = [_key(part.name, given) for given in inputs]
         missing = {key: given for key, given in zip(keys, inputs, strict=True) if key not in self.known}
         if missing:
@@ -94,7 +95,7 @@ class Parts:
         return [self.known[key][1] for key in keys]
 
     def texts(self, part: Part, inputs: Sequence[Any], progress: Progress = silent) -> list[bytes]:
-        """The text of each input, of a part of dtype "u1" whose rows `text_rows` makes; b"" of one that was too long."""
+        """The text for each input, for a part of dtype "u1" whose rows `text_rows` makes; b"" for a text that was too long."""
         return [row.tobytes().removesuffix(END) for row in self.rows(part, inputs, progress)]
 
     def _plan(self, part: Part, inputs: list[Any]) -> Plan:
@@ -108,7 +109,7 @@ class Parts:
         )
 
     def _remember(self, folder: Path) -> None:
-        """Take in the rows of a part; of one that is damaged, or of another function, nothing, and it is computed again."""
+        """Read the rows of a part from its folder; a part that is damaged, or of another function, is skipped and recomputed."""
         from saltus.sweep.store_status import read_plan
 
         try:
@@ -135,7 +136,7 @@ def text_rows(texts: Sequence[bytes], width: int) -> np.ndarray:
 
 
 def parts_of(store: Path, verify: bool = False) -> Iterator[StoreStatus]:
-    """How far the parts in a store are; to `verify` reads all of them."""
+    """The states of all parts in a store; with `verify` all of their files are read."""
     folder = store / PARTS
     for path in sorted(folder.iterdir()) if folder.is_dir() else ():
         if (path / "zarr.json").is_file():
@@ -143,7 +144,7 @@ def parts_of(store: Path, verify: bool = False) -> Iterator[StoreStatus]:
 
 
 def _trimmed(row: np.ndarray) -> np.ndarray:
-    """A row; of a text without the zeros with which it is filled up."""
+    """A row; for a text, without the zeros that pad it."""
     return row if row.dtype != np.uint8 else np.trim_zeros(row, "b").copy()
 
 

@@ -1,4 +1,4 @@
-"""The plan of a sweep: a function, its arguments, a grid and how it is cut into chunks."""
+"""The plan of a sweep: a function, its arguments, a grid, and its division into chunks."""
 
 from __future__ import annotations
 
@@ -16,25 +16,24 @@ from saltus.sweep.chunk_results import resolve
 from saltus.sweep.jsonable import as_json, one_line
 
 RESERVED = ("zarr.json", "plan")
-WRITER = "saltus_version"  # an attribute that says who wrote a store, not what is computed: `result_version` says that
+WRITER = "saltus_version"  # names the version that wrote a store; whether results are the same is told by `result_version`
 
 
 @dataclass(frozen=True, kw_only=True)
 class Variable:
-    """A variable of a sweep: its NumPy type (boolean, integer, real or complex), the (name, size) of its dimensions beside the
-    grid's axes, its attributes, and the value that stands where nothing is computed yet (by default NaN; 0 or False where
-    there is none).
+    """A variable of a sweep: its NumPy type (boolean, integer, real or complex), the (name, size) of its dimensions in addition
+    to the grid's axes, its attributes, and the fill value of chunks that are not computed yet.
 
     Parameters
     ----------
     dtype
-        NumPy's name of its type.
+        The name of its NumPy type.
     extra
         Its own dimensions after those of the axes, each with its length.
     attrs
         Its attributes, such as units and a long name.
     fill
-        What stands in chunks that are not computed; by default nan, or 0 of a whole number.
+        The value in chunks that are not computed; by default nan, or 0 or False for types that have no nan.
 
     Examples
     --------
@@ -84,21 +83,21 @@ class Plan:
     function
         "package.module:name", importable wherever it runs.
     arguments
-        What is the same for all chunks; JSON-able, and given to the function as JSON gives it back.
+        The arguments that are the same for all chunks: values that JSON has, given to the function as JSON gives them back.
     axes
         1-D arrays of numbers by name, the grid's coordinates.
     chunk
-        How many points of each axis one chunk takes; all of an axis that is not named.
+        The number of points of a chunk along each axis; all points of an axis that is not named.
     variables
         A `Variable` by name for each array that the function returns.
     attrs
-        Provenance, JSON-able: kind, system, version, seed, ...
+        Provenance, in values that JSON has: kind, system, version, seed, ...
 
     Raises
     ------
     ParameterError
-        An unknown function, a bad name, axis or chunk, or something that JSON does not have;
-        a grid of more chunks than can be looked through.
+        The function is unknown; a name, an axis or a chunk is wrong; a value is none that JSON has; or the grid has too many
+        chunks.
 
     Examples
     --------

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import xarray
 
 
-LONGEST_NAME_OF_A_FILE = 200  # bytes: file systems take 255, and what is half-written has a longer name
+LONGEST_NAME_OF_A_FILE = 200  # bytes: file systems allow 255, and half-written files have longer names
 BEGIN_ANEW = "name another store, or remove this one to begin anew (`saltus run --fresh`)"
 
 log = logging.getLogger("saltus.sweep")
@@ -38,8 +38,8 @@ log = logging.getLogger("saltus.sweep")
 class Store:
     """The arrays of a plan, in a folder.
 
-    A chunk is done when the file of every variable is there. A file is written once, and is complete or not there; its bytes
-    are those of the computed numbers alone: a store does not show who wrote it, when, or in what order.
+    A chunk is done when the files of all variables are there. A file is written once, and is complete or not there. Its bytes
+    depend on the computed numbers alone, not on who wrote the store, when, or in which order.
     """
 
     def __init__(self, plan: Plan, path: Path) -> None:
@@ -96,17 +96,17 @@ class Store:
             files.chunk_file(self.path, name, index, len(variable.extra)).unlink(missing_ok=True)
 
     def note(self, failures: Iterable[Failure]) -> None:
-        """Keep a list of the chunks that failed beside the arrays, for `status`; without any, the file is gone."""
+        """Keep a list of the failed chunks beside the arrays, for `status`; without failures the file is removed."""
         entries = [{"index": f.index, "place": f.place, "error": f.error, "attempts": f.attempts} for f in failures]
         file = self.path / files.FAILURES
-        with contextlib.suppress(OSError):  # a full disk is told where a chunk is written
+        with contextlib.suppress(OSError):  # a full disk is reported when a chunk is written
             if entries:
                 write_durably(file, json.dumps(entries).encode())
             else:
                 file.unlink(missing_ok=True)
 
     def dataset(self) -> xarray.Dataset:
-        """What there is, read from the folder as it is needed."""
+        """The dataset of the chunks that are there, read from the folder as it is needed."""
         return _dataset(self.zarr)[list(self.plan.variables)]
 
     def _has(self, name: str, index: Index) -> bool:
@@ -123,10 +123,10 @@ def opened(plan: Plan, path: Path) -> Iterator[Store]:
     ParameterError
         There is something else at `path`, or the store of another plan.
     SweepError
-        It cannot be made, or another run is writing to it.
+        The store cannot be made, or another run is writing to it.
     """
     check_store(plan, path)
-    if not (path / files.METADATA).is_file():  # it is what the lock is on
+    if not (path / files.METADATA).is_file():  # the lock is on this file
         (_restore if (path / files.CHECKSUMS).is_file() else _create)(plan, path)
     with files.locked(path) as got:
         if got is False:
@@ -144,7 +144,7 @@ def check_store(plan: Plan, path: Path) -> None:
     Raises
     ------
     ParameterError
-        With what is there, or what is damaged so that it cannot be told whose store it is.
+        The message says what is there, or what is so damaged that the plan of the store is not known.
     """
     if not 0 < len(os.fsencode(path.name)) <= LONGEST_NAME_OF_A_FILE:
         raise ParameterError(f"store must name a folder, such as 'chart.zarr', got {shown(str(path))}", "store")
@@ -176,16 +176,16 @@ def remove_store(path: Path | str) -> None:
     Raises
     ------
     ParameterError
-        There is something else.
+        There is something else at `path`.
     SweepError
-        A run is writing to it, or it cannot be removed.
+        A run is writing to the store, or it cannot be removed.
 
     Examples
     --------
     >>> saltus.sweep.remove_store("nowhere.zarr")
     """
     path = Path(path)
-    if not os.path.exists(path):  # which a name that is too long is not, either
+    if not os.path.exists(path):  # also False for a name that is too long
         return
     if not ((path / files.METADATA).is_file() or (path / files.CHECKSUMS).is_file()):
         raise ParameterError(f"{path} is no store, so it is not removed; name another place", "path")
@@ -203,7 +203,7 @@ def _restorable(plan: Plan, path: Path) -> dict[str, bytes]:
     Raises
     ------
     ParameterError
-        Nothing that is left shows that the store is of this plan.
+        The intact files do not show that the store is of this plan.
     """
     damaged = files.damaged_files(path)
     with tempfile.TemporaryDirectory() as folder:
@@ -242,14 +242,14 @@ def open_store(path: Path | str, *, partial: bool = False) -> xarray.Dataset:
     path
         The store.
     partial
-        Whether it may be incomplete; where nothing is computed yet stands each variable's fill value, NaN for reals.
+        Whether it may be incomplete; chunks that are not computed yet have each variable's fill value, NaN for reals.
 
     Raises
     ------
     ParameterError
-        No store of a sweep.
+        There is no store of a sweep at `path`.
     SweepError
-        It is incomplete or damaged.
+        The store is incomplete or damaged.
 
     Examples
     --------
@@ -272,7 +272,7 @@ def open_store(path: Path | str, *, partial: bool = False) -> xarray.Dataset:
 
 
 def reason(error: OSError) -> str:
-    """What the system says, as part of a sentence."""
+    """The operating system's reason for an error, as part of a sentence."""
     return (error.strerror or str(error)).lower()
 
 
@@ -286,7 +286,7 @@ def _zarr_store(folder: Path) -> Any:
 def _dataset(store: Any) -> xarray.Dataset:
     import xarray
 
-    # Nothing is decoded: a variable in seconds is no time difference, and a fill value is a value.
+    # Nothing is decoded, so that a variable in seconds stays a number and a fill value stays a value.
     dataset: xarray.Dataset = xarray.open_zarr(store, chunks=None, consolidated=True, zarr_format=3, decode_cf=False)
     return dataset
 
@@ -306,7 +306,7 @@ def _create(plan: Plan, path: Path) -> None:
 
 
 def _make(plan: Plan, folder: Path) -> None:
-    """Write the metadata and the coordinates, then their checksums; nothing of it is ever written again."""
+    """Write the metadata and the coordinates, then their checksums; none of these files is ever written again."""
     import zarr
     from zarr.codecs import Crc32cCodec, ZstdCodec
 

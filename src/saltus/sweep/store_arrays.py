@@ -1,7 +1,7 @@
-"""Whether the arrays of a store are those of its plan: this is told from its JSON, before Zarr is given any of it.
+"""The check that the arrays of a store are those of its plan: by its JSON, before Zarr reads any of it.
 
-Zarr follows what it finds: arrays of its older format, whose filters may be pickles that run code, any codec that is installed,
-and shapes of any size. A store of a sweep has none of these, so one that has was changed by somebody else.
+Zarr accepts whatever the metadata say: arrays of its older format, whose filters may be pickles that run code, any codec that is
+installed, and shapes of any size. The store of a sweep has none of these; a store that has them was changed by somebody else.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def check_arrays(where: str, group: dict[str, Any], plan: dict[str, Any], chunks
     Raises
     ------
     ParameterError
-        With the array that differs; the coordinates need more memory than there is.
+        An array differs, which the message names; or the coordinates need more memory than there is.
     """
     try:
         expected = dict(_expected(plan, chunks))
@@ -37,7 +37,7 @@ def check_arrays(where: str, group: dict[str, Any], plan: dict[str, Any], chunks
 
 
 def _expected(plan: dict[str, Any], chunks: ChunkGrid) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Each array of a plan: name, and what its metadata say."""
+    """Each array of a plan: its name, and the description that its metadata must match."""
     for name, size in chunks.sizes.items():
         yield name, _array(plan["axes"][name]["dtype"], [name], [size], [size])
     for name, variable in plan["variables"].items():
@@ -62,7 +62,7 @@ def _array(dtype: str, dimensions: list[str], shape: list[int], chunk: list[int]
 
 
 def _described(metadata: dict[str, Any]) -> dict[str, Any]:
-    """What the metadata of an array say, as `_array` has it."""
+    """The description of an array by its metadata, in the form of `_array`."""
     said = {key: metadata.get(key) for key in _array("", [], [], [])}
     codecs = [codec if isinstance(codec, str) else codec["name"] for codec in metadata["codecs"]]
     filled = metadata.get("fill_value") is not None

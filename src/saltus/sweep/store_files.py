@@ -21,9 +21,9 @@ from saltus.sweep.chunk_grid import Index
 
 METADATA = "zarr.json"
 FAILURES = ".failures.json"
-CHECKSUMS = ".checksums.json"  # of the files that are written once, when the store is made: all but the chunks
-ASKED_ONE_BY_ONE = 100_000  # chunks of a variable of which the system is asked one by one
-LOCK_PATIENCE = 1.0  # s to wait for a lock: a process that only looks whether there is one holds it for a moment
+CHECKSUMS = ".checksums.json"  # the digests of the files that are written when the store is made: all but the chunks
+ASKED_ONE_BY_ONE = 100_000  # sizes and times are read of so many chunks of a variable; the others are only listed
+LOCK_PATIENCE = 1.0  # how long to wait for a lock, s: a process that only checks whether there is one holds it briefly
 
 
 def write_checksums(root: Path) -> None:
@@ -33,7 +33,7 @@ def write_checksums(root: Path) -> None:
 
 
 def damaged_files(root: Path) -> list[str]:
-    """The files, chunks left out, that are missing or are not what they were when the store at `root` was made."""
+    """The files other than chunks that are missing or have changed since the store at `root` was made."""
     try:
         known = checksums(root)
     except (OSError, ValueError):
@@ -67,7 +67,7 @@ def _sha256(file: Path) -> str | None:
 
 
 def chunk_name(variable: str, index: Index, extra: int) -> str:
-    """Where in a store Zarr's default encoding keeps a chunk of a variable with `extra` dimensions beside the grid's axes."""
+    """The path in a store, by Zarr's default encoding, of a chunk of a variable with `extra` dimensions after the grid's axes."""
     return "/".join((variable, "c", *map(str, index), *("0" for _ in range(extra))))
 
 
@@ -78,7 +78,7 @@ def chunk_file(root: Path, variable: str, index: Index, extra: int) -> Path:
 
 @dataclass
 class Found:
-    """Files of a store: how many, their size in bytes, when the last one was written (0.0: none), and which chunks are there."""
+    """Files of a store: their number, their size in bytes, when the last one was written (0.0: none), and the chunks there."""
 
     there: np.ndarray  # (chunks along each axis), bool
     count: int = 0
@@ -86,10 +86,10 @@ class Found:
     updated: float = 0.0
 
     def add(self, path: str) -> bool:
-        """Take in a file, of which the system is asked; devices and pipes, which may have no end, are none."""
+        """Add a file after asking the system about it; False for devices and pipes, which may have no end."""
         try:
             found = os.stat(path)
-        except OSError:  # written beside its place, and moved there meanwhile
+        except OSError:  # a half-written file that was moved to its place in the meantime
             return False
         if not stat.S_ISREG(found.st_mode):
             return False
@@ -102,8 +102,8 @@ class Found:
 def chunks_of(root: Path, variable: str, grid: tuple[int, ...], extra: int) -> Found:
     """The chunks of a variable with `extra` dimensions beside the grid's axes that have a file in the store at `root`.
 
-    Of more than `ASKED_ONE_BY_ONE` chunks only their folders are read, in a sixth of the time: the size is then that of the
-    first ones times their number, and a folder tells when its last file was written.
+    If there are more than `ASKED_ONE_BY_ONE` chunks only their folders are read, in a sixth of the time: the size is then
+    estimated from the first ones, and the time of the last write is that of the folders.
     """
     found, inner, further = Found(np.zeros(grid, dtype=bool)), "/0" * extra, 0
     names = [{str(i): i for i in range(n)} for n in grid]
@@ -132,7 +132,7 @@ def chunks_of(root: Path, variable: str, grid: tuple[int, ...], extra: int) -> F
 
 
 def other_files(root: Path, variables: Iterable[str]) -> Found:
-    """The files below `root` that are no chunks of its variables: metadata, coordinates, parts."""
+    """The files below `root` other than chunks of its variables: metadata, coordinates, parts."""
     found, chunks = Found(np.empty(0)), {str(root / variable / "c") for variable in variables}
     folders = [str(root)]
     while folders:
@@ -164,8 +164,8 @@ def finish(part: Path, path: Path) -> None:
 
 
 def sweep_up(path: Path) -> None:
-    """Remove what killed runs left half-written, in the store at `path` and beside it. The caller has the lock."""
-    for part in list(path.rglob(f".*{PART}")):  # only who has the lock writes here
+    """Remove the half-written files of killed runs, in the store at `path` and beside it. The caller holds the lock."""
+    for part in list(path.rglob(f".*{PART}")):  # no other process writes here without the lock
         with contextlib.suppress(OSError):
             shutil.rmtree(part) if part.is_dir() else part.unlink()
     for part in path.parent.glob(f".{path.name}.*{PART}"):
@@ -176,9 +176,9 @@ def sweep_up(path: Path) -> None:
 
 @contextlib.contextmanager
 def locked(path: Path) -> Iterator[bool | None]:
-    """Lock the store at `path` for one run; yields whether it could, None where there are no locks or it is read-only.
+    """Lock the store at `path` for one run; yields whether this succeeded, None if there are no locks or it is read-only.
 
-    The lock is on the store's metadata, a file that is never written again. It ends with the process, however that ends.
+    The lock is on the store's metadata file, which is never written again. It is released when the process ends, however it ends.
     """
     try:
         file = (path / METADATA).open("r+b")
@@ -193,7 +193,7 @@ def locked(path: Path) -> Iterator[bool | None]:
 
 
 def in_use(path: Path) -> bool | None:
-    """Whether a run has the lock of the store at `path`; None where that cannot be told."""
+    """Whether a run holds the lock of the store at `path`; None if the file system cannot tell."""
     try:
         with (path / METADATA).open("rb") as file:
             got = lock(file, shared=True)

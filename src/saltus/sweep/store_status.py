@@ -1,4 +1,4 @@
-"""How far a sweep is, read from the files of its store alone."""
+"""The state of a sweep, read from the files of its store alone."""
 
 from __future__ import annotations
 
@@ -24,40 +24,37 @@ NAMED = 3  # damaged files that a sentence names
 
 @dataclass(frozen=True)
 class StoreStatus:
-    """How far a sweep is.
+    """The state of a sweep, from its store.
 
-    `done` and `failed` count chunks, of `total`; a failed chunk is one that raised when it was last tried. `bytes` is the size of
-    the store's files, of more than 100 000 chunks estimated from as many (`estimated`). `started` is when the store was made,
-    `updated` when the last chunk was written (None: none yet).
-    `running` is whether a run on this machine is writing to it, None where the file system has no locks. `damaged` are the files
-    that are not what was written, if that was looked at; a chunk with such a file is not done.
+    A failed chunk is one that raised an error when it was last tried. The size of stores with more than 100 000 chunks is
+    estimated (`estimated`). A chunk with a damaged file is not done.
 
     Attributes
     ----------
     path
         The folder.
     kind
-        What is computed, such as "basins".
+        The kind of its result, such as "basins".
     function
-        What computes a chunk.
+        The name of the function that computes a chunk.
     sizes
         The length of each dimension by its name.
     done
-        How many chunks are complete.
+        The number of chunks that are complete.
     total
-        How many there are.
+        The number of all chunks.
     failures
         The chunks that failed.
     bytes
-        The size of the folder.
+        The size of its files.
     started
-        When its first run began.
+        When the store was made.
     updated
-        When its last chunk was written; None without one.
+        When its last chunk was written; None if there is none yet.
     running
-        Whether a run is writing to it now; None where that cannot be told.
+        Whether a run on this machine is writing to it now; None if the file system has no locks.
     damaged
-        Files that are damaged, if they were looked at.
+        The files that differ from what was written, if this was checked.
 
     Examples
     --------
@@ -86,7 +83,7 @@ class StoreStatus:
 
     @property
     def estimated(self) -> bool:
-        """Whether `bytes` is an estimate, as not every file was asked for its size."""
+        """Whether `bytes` is an estimate, because the system was not asked for the size of every file."""
         return self.total > files.ASKED_ONE_BY_ONE
 
     @property
@@ -97,7 +94,7 @@ class StoreStatus:
 
 @answered
 def status(path: Path | str, *, verify: bool = False) -> StoreStatus:
-    """How far the sweep is whose store is at `path`; to `verify` reads all of it, and finds the files that are damaged.
+    """The state of the sweep whose store is at `path`; with `verify` all of it is read, and damaged files are found.
 
     Parameters
     ----------
@@ -146,12 +143,12 @@ def status(path: Path | str, *, verify: bool = False) -> StoreStatus:
 
 
 def _is_missing(done: np.ndarray, index: Index) -> bool:
-    """Whether there is such a chunk, and it is not done; a list of failures may have been damaged."""
+    """Whether a chunk with this index exists and is not done; the index is from a list of failures, which may be damaged."""
     return len(index) == done.ndim and all(0 <= i < n for i, n in zip(index, done.shape, strict=True)) and not done[index]
 
 
 def damage(found: StoreStatus) -> str:
-    """What is damaged in a store, as the beginning of a sentence."""
+    """The damage of a store, as the beginning of a sentence."""
     count = len(found.damaged)
     named = ", ".join(found.damaged[:NAMED]) + (f" and {count - NAMED} more" if count > NAMED else "")
     return f"{found.path} has {count} damaged or missing file{'s' * (count > 1)} ({named})"
@@ -175,10 +172,10 @@ def read_plan(path: Path) -> dict[str, Any]:
     Raises
     ------
     ParameterError
-        There is nothing at `path`, or no store, or one that is not of a sweep, or whose metadata are damaged
-        or are not those of its plan.
+        At `path` there is nothing, no store, or the store of something else than a sweep; or its metadata are damaged, or are not
+        those of its plan.
     """
-    if not os.path.exists(path):  # which a name that is too long is not, either
+    if not os.path.exists(path):  # also False for a name that is too long
         raise ParameterError(f"there is no store at {path}", "path")
     if not path.is_dir():
         raise ParameterError(f"{path} is a file; the store of a sweep is a folder", "path")
@@ -203,18 +200,18 @@ def read_plan(path: Path) -> dict[str, Any]:
 
 
 def grid_of(plan: dict[str, Any]) -> ChunkGrid:
-    """How the grid of a plan that was read from a file is cut.
+    """The division into chunks of the grid of a plan that was read from a file.
 
     Raises
     ------
     KeyError
-        It is none that a plan can have.
+        No plan can have such a grid.
     TypeError
-        It is none that a plan can have.
+        No plan can have such a grid.
     ValueError
-        It is none that a plan can have.
+        No plan can have such a grid.
     AttributeError
-        It is none that a plan can have.
+        No plan can have such a grid.
     """
     sizes = {str(name): plan["axes"][name]["size"] for name in plan["order"]}
     chunks = ChunkGrid(sizes, {name: plan["chunk"][name] for name in sizes})

@@ -1,4 +1,4 @@
-"""Whether the files of a store are what was written: metadata by their digests, chunks by the checksum that each carries."""
+"""The check that the files of a store are as they were written: metadata by their digests, chunks by their own checksums."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from saltus.checks import LIMITS, free_memory
 from saltus.sweep import store_files as files
 from saltus.sweep.chunk_grid import ChunkGrid, Index
 
-BYTES_AT_ONCE = 256e6  # bytes that are read together, which is faster than chunk by chunk
+BYTES_AT_ONCE = 256e6  # bytes of chunks that are read together, which is faster than reading them one by one
 
 
 def damaged_chunks(path: Path, arrays: Any, chunks: ChunkGrid, extra: dict[str, int]) -> Iterator[tuple[str, Index]]:
@@ -22,11 +22,11 @@ def damaged_chunks(path: Path, arrays: Any, chunks: ChunkGrid, extra: dict[str, 
     Parameters
     ----------
     path
-        Of the store.
+        The path of the store.
     arrays
         Zarr's array of each variable.
     chunks
-        How the grid is cut.
+        The division of the grid into chunks.
     extra
         The number of dimensions of each variable beside the grid's axes.
     """
@@ -43,15 +43,15 @@ def damaged_chunks(path: Path, arrays: Any, chunks: ChunkGrid, extra: dict[str, 
 
 
 def _row_size(array: Any, rows: slice) -> float:
-    """The bytes of some rows, by what the array says of itself."""
+    """The size of some rows in bytes, according to the array's metadata."""
     return float(float(rows.stop - rows.start) * math.prod(map(float, array.shape[1:])) * array.dtype.itemsize)
 
 
 def _can_be_read(array: Any, cut: tuple[slice, ...]) -> bool:
     if math.prod(map(float, array.chunks)) * array.dtype.itemsize > LIMITS.memory * free_memory():
-        return False  # what a file says of itself is not a size to allocate
+        return False  # a size that a damaged file gives must not be allocated
     try:
         array[cut]
-    except Exception:  # what is wrong is said by Zarr, by its codecs or by the system
+    except Exception:  # errors may come from Zarr, from its codecs or from the system
         return False
     return True

@@ -1,4 +1,4 @@
-"""Chunks computed in processes of their own."""
+"""Chunks computed by other processes of this machine."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ READY = "ready"
 
 
 class Workers:
-    """Up to `count` processes that compute chunks, begun as they are needed and kept from one sweep to the next.
+    """Up to `count` processes that compute chunks, started as they are needed and kept from one sweep to the next.
 
-    A context manager, at whose end they end.
+    It is a context manager; the processes end with the context.
     """
 
     def __init__(self, count: int) -> None:
@@ -37,9 +37,9 @@ class Workers:
         self.pool.clear()
 
     def outcomes(self, plan: Plan, queue: deque[Index]) -> Iterator[tuple[Index, Any]]:
-        """Compute the chunks in the queue, and give what became of each as it comes.
+        """Compute the chunks in the queue, and yield the outcome of each as it comes.
 
-        A process that dies (killed, out of memory) fails its own chunk alone, and another takes its place.
+        If a process dies (killed, out of memory), only its own chunk fails, and another process takes its place.
 
         Raises
         ------
@@ -66,7 +66,7 @@ class Workers:
                     assert index is not None
                     yield index, outcome
         finally:
-            for worker in [worker for worker in pool if worker.index is not None]:  # of no use any more
+            for worker in [worker for worker in pool if worker.index is not None]:  # their chunks are not needed any more
                 pool.remove(worker)
                 worker.stop()
 
@@ -85,11 +85,11 @@ class _Worker:
 
     def take(self, plan: Plan, index: Index) -> None:
         self.index = index
-        with contextlib.suppress(OSError):  # it died: `receive` sees that
+        with contextlib.suppress(OSError):  # the process has died, which `receive` finds out
             self.connection.send((plan.function, plan.arguments, plan.block(index)))
 
     def receive(self) -> Any:
-        """What it sent; if it has died, what is known of that."""
+        """The outcome that the process has sent; if it has died, a failure with the known reason."""
         try:
             outcome = self.connection.recv()
         except (EOFError, OSError):
@@ -117,9 +117,9 @@ def _death(code: int) -> str:
 
 
 def _work(connection: Connection) -> None:
-    """Compute what comes, until nothing more can come."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all; the process that writes decides
-    with contextlib.suppress(EOFError, OSError):  # that process has ended
+    """The main loop of a process: compute the chunks that it is sent, until the pipe is closed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes; the one that writes decides when to stop
+    with contextlib.suppress(EOFError, OSError):  # the process that writes has ended
         connection.send(READY)
         while True:
             connection.send(attempt(*connection.recv()))

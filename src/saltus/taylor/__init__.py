@@ -1,13 +1,14 @@
 """From a model's Python to its Taylor series in machine code: traced, differentiated, written, compiled and cached.
 
-The way of an equation. `tracing.py` runs a model once on symbols, which gives a graph of shared nodes (`graph.py`).
+The path of an equation. `tracing.py` runs a model once on symbols, which gives a graph of shared nodes (`graph.py`).
 `derivatives.py` differentiates it. `tapes.py` lists the nodes, operands first, for a generated source file (`generated.py`).
 When that file is compiled, `series.py` (Taylor coefficients) and `instants.py` (values at one instant) write LLVM's
 instructions for the tapes by the rules of `rules.py`: for one motion on plain doubles, for an ensemble on vectors with one double
-for each lane. `memory.py` knows where the code finds its arguments, `vectors.py` what arithmetic it is made of;
-`lane_vectors.py` gives numba the same vectors for the ensemble's own loops. There is no second generator and no second rule.
+for each lane. `memory.py` has the places of the code's arguments, `vectors.py` the arithmetic on which it is written;
+`lane_vectors.py` gives numba the same vectors for the ensemble's own loops. There is no second generator, and each function has
+one rule.
 
-What the generated code may assume. The time reaches it through the load only, as a local time that restarts with every forcing
+Assumptions of the generated code. The time enters through the load only, as a local time that restarts with every forcing
 period. Expressions that are expanded in series hold no comparisons; on one side of a contact they are analytic wherever they are
 finite. Parts that depend on parameters alone are computed once for a motion (`shared_constants`). Series may use fused
 multiply-adds; values at an instant never do, so that the difference of two equal products is 0. One motion divides and uses the C
@@ -19,8 +20,8 @@ follow from it (of a function that does not increase, the bounds need an entry i
 `tests/taylor/test_series.py` goes through the table and compares the coefficients with power series in 40 digits.
 
 How code is cached: a generated file lies in the user's cache directory under a digest of its text, of the sources that write its
-code and of numba's options (`cache.py`), and numba keeps the machine code beside it. Numbers are arguments, so they never compile
-anything. What numba does not promise to keep is used in `private_numba.py` alone.
+code and of numba's options (`cache.py`), and numba keeps the machine code beside it. Numbers are arguments, so that new numbers
+never compile anything. Interfaces of numba that are not public are used in `private_numba.py` alone.
 """
 
 from saltus._front_door import front_door

@@ -1,9 +1,9 @@
 """Compiled code on disk: generated source files in the user's cache directory, each with numba's compiled code beside it.
 
-Numbers never compile anything. A file's name is a digest of all of its source and of the compiler's options, so that a change
-of either makes a new file. A file appears in one move, so that processes that compile at the same time do not disturb each other.
-What is found there is run only from a folder of the user's own, and only if it is what was written: a source is compared with the
-text that is wanted, and compiled code, Python's and numba's, with its digest. What is damaged is made again, with a remark.
+A file's name is a digest of its whole source and of the compiler's options, so that a change of either makes a new file. A file
+is put into its place in one step, so that processes that compile at the same time do not disturb each other. Code from the cache
+is run only if the folder belongs to the user and the file is as it was written: a source is compared with the wanted text, and
+compiled code, Python's and numba's, with its digest. Damaged files are made again, with a remark.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ from typing import cast
 from saltus.files import lock
 from saltus.taylor import private_numba, references
 
-NOBODY = 65534  # to whom a container gives what belongs to the superuser outside of it
+NOBODY = 65534  # the user to whom, inside a container, the files of the superuser outside belong
 MARKER = "# --- compiled from here on"
 log = logging.getLogger("saltus.cache")
 _loading = threading.RLock()  # A module is in `sys.modules` while it is still being executed: other threads wait for it.
 
 
 def cache_directory() -> Path:
-    """Where compiled code is kept: SALTUS_CACHE_DIR, or the user's cache directory, or a temporary one if neither can be used.
+    """The folder of compiled code: SALTUS_CACHE_DIR, or the user's cache directory, or a temporary one if neither can be used.
 
-    Code that is found there is run, so it belongs to the user alone: no link, nobody else's, and nobody else may write to it.
+    As code in it is run, it must be a real folder (no link) that belongs to the user, and to which nobody else can write.
     """
     wanted = Path(os.environ.get("SALTUS_CACHE_DIR") or _user_cache()) / "kernels"
     user = os.getuid() if hasattr(os, "getuid") else "user"
@@ -66,14 +66,14 @@ def _user_cache() -> str:
 
 @cache
 def _own_folder() -> Path:
-    """A folder for this process alone, which goes with it."""
-    folder = tempfile.mkdtemp(prefix="saltus-kernels-")  # as nobody else can make it
+    """A folder for this process alone, which is removed at its end."""
+    folder = tempfile.mkdtemp(prefix="saltus-kernels-")  # a new name, which nobody else can have prepared
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return Path(folder)
 
 
 def _problem(folder: Path) -> str | None:
-    """Why a folder is not one to keep code in, or None; it is made as needed."""
+    """The reason why code must not be kept in a folder, or None; the folder is made if it does not exist."""
     try:
         folder.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         if any(_replaceable(above.stat()) for above in folder.resolve().parents):
@@ -90,7 +90,8 @@ def _problem(folder: Path) -> str | None:
 
 
 def _replaceable(found: os.stat_result) -> bool:
-    """Whether others may rename what is in a folder: who owns it, and who may write to it unless it is a temporary directory."""
+    """Whether others may rename files in a folder: by its owner, and by who may write to it unless it is a temporary
+    directory."""
     if not hasattr(os, "getuid"):
         return False
     if found.st_uid not in (0, os.getuid(), NOBODY):
@@ -100,19 +101,19 @@ def _replaceable(found: os.stat_result) -> bool:
 
 
 def _is_own_group(number: int) -> bool:
-    """Whether a group is of nobody but the user, of whose name it is, or of the superuser."""
+    """Whether a group has no other members than the user, whose name it has, or the superuser."""
     import grp
     import pwd
 
     try:
         group, name = grp.getgrgid(number), pwd.getpwuid(os.getuid()).pw_name
-    except KeyError:  # it has no name, nor is it known who is in it
+    except KeyError:  # the group has no name, and its members are unknown
         return False
     return (number == 0 or group.gr_name == name) and set(group.gr_mem) <= {name}
 
 
 def _shared(found: os.stat_result) -> str | None:
-    """What makes a folder one that is not the user's alone, or None."""
+    """The reason why a folder is not the user's alone, or None."""
     if not stat.S_ISDIR(found.st_mode):
         return "it is a link or a file"
     if not hasattr(os, "getuid"):
@@ -124,13 +125,13 @@ def _shared(found: os.stat_result) -> str | None:
 
 @cache
 def source_of(module: ModuleType) -> str:
-    """The text of a module, from its loader: `inspect` looks through all modules first."""
+    """The text of a module, from its loader, since `inspect` would search all modules first."""
     return str(cast(InspectLoader, module.__loader__).get_source(module.__name__))
 
 
 @cache
 def compiled_part(module: ModuleType) -> str:
-    """The compiled part of a source file: what stands below its marker, with members of `IntEnum`s written as their numbers."""
+    """The compiled part of a source file: the text below its marker, with members of `IntEnum`s replaced by their numbers."""
     numbers = {
         f"{name}.{member.name}": str(int(member))
         for name, kind in vars(module).items()
@@ -174,8 +175,8 @@ def load_module(kind: str, text: str) -> ModuleType:
 
 @contextlib.contextmanager
 def _alone(path: Path) -> Iterator[None]:
-    """Let other processes that want the same source wait, and load what this one has compiled; they compile it too where files
-    cannot be locked. The lock is on a file beside the source, which is never replaced as the source is."""
+    """Let other processes that need the same source wait and then load the code that this one has compiled; if files cannot be
+    locked, they compile it too. The lock is on a file beside the source, because the source itself may be replaced."""
     with path.with_suffix(".lock").open("ab") as file:
         lock(file, wait=True)
         yield
@@ -190,7 +191,7 @@ def _holds(path: Path, text: str) -> bool:
 
 
 def _execute(name: str, path: Path, text: str) -> None:
-    """Make a module of a source, which stands in a file too: numba keeps its compiled code beside it."""
+    """Make a module of a source that is also in a file, beside which numba keeps the compiled code."""
     module = ModuleType(name)
     module.__file__ = str(path)
     sys.modules[name] = module  # numba finds the functions of a cached module through here
@@ -203,7 +204,7 @@ def _execute(name: str, path: Path, text: str) -> None:
 
 
 def _bytecode(path: Path, text: str) -> CodeType:
-    """A source's bytecode, which is kept beside numba's code: Python would take longer over the text than numba over the rest."""
+    """A source's bytecode, which is kept beside numba's code: parsing the text would take longer than loading numba's code."""
     file = path.parent / "__pycache__" / f"{path.stem}.{MAGIC_NUMBER.hex()}.bytecode"
     content = private_numba.undamaged(str(file))
     if content is not None:
@@ -217,7 +218,8 @@ def _bytecode(path: Path, text: str) -> CodeType:
 
 
 def _write(path: Path, content: bytes) -> None:
-    """Write a file that appears in one move; all have the same time, as numba trusts what it kept for a file of the same time."""
+    """Write a file into its place in one step. All files get the same time, because numba uses code that it has kept only for a
+    source with the same time."""
     handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
     try:
         with os.fdopen(handle, "wb") as file:

@@ -1,10 +1,10 @@
-"""One expression in the place of several of which each lane needs one: what they have in common is computed once for all lanes.
+"""One expression that replaces several alternatives of which each lane needs one, so that all lanes can compute it together.
 
-The motion of one free coordinate while all others are held is, say, theta_1'' = p sin(beta_0 + theta_1) - C theta_1' or
-theta_2'' = q sin(beta_0 - theta_2) - c theta_2'. With theta for either both are a_1 sin(theta) + a_2 cos(theta) + a_3 theta',
-whose coefficients, constants of the motion, each lane chooses. An expression is taken apart into a sum of terms, a coefficient
-that does not change in time times factors that do; terms with factors of the same kinds become one. The sine and the cosine of
-a sum are taken apart likewise, so that all angles that differ by constants share one sine and one cosine.
+The motion of one free coordinate while all others are held is, say, theta_1'' = p sin(beta_0 + theta_1) - C theta_1' or theta_2''
+= q sin(beta_0 - theta_2) - c theta_2'. With theta for the free one, both have the form a_1 sin(theta) + a_2 cos(theta) + a_3
+theta', in which each lane chooses its own constant coefficients. Every alternative is expanded into a sum of terms, each a
+coefficient that is constant in time times factors that are not; terms of different alternatives with factors of the same kinds
+are merged. Sines and cosines of sums are expanded too, so that all angles that differ by constants share one sine and one cosine.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Terms = dict[Factors, Expr]  # the coefficient of each product of factors; that 
 
 
 class CommonForm:
-    """Expressions that agree with the i-th of several alternatives wherever the i-th chooser is 1 and the others are 0."""
+    """Makes expressions that equal the i-th of several alternatives wherever the i-th chooser is 1 and the others are 0."""
 
     def __init__(self, choosers: Sequence[Expr]) -> None:
         self._choosers = choosers
@@ -28,14 +28,14 @@ class CommonForm:
         self._made: dict[tuple[Expr, ...], Expr] = {}
 
     def of(self, alternatives: Sequence[Expr]) -> Expr:
-        """The one expression for these alternatives, which must have a value wherever one of them is chosen."""
+        """The expression for these alternatives; all of them must have a value wherever one of them is chosen."""
         key = tuple(alternatives)
         if key not in self._made:
             self._made[key] = self._unified(key)
         return self._made[key]
 
     def integral(self, e: Expr, leaf: Expr) -> Expr | None:
-        """The integral of an expression over a leaf, of sines and cosines of that leaf alone and a constant; None of others."""
+        """The integral over a leaf of an expression made of sines and cosines of this leaf and constants; None for others."""
         sine, cosine, total = combine("sin", leaf), combine("cos", leaf), number(0.0)
         integrals: dict[Factors, Expr] = {(): leaf, (sine,): -cosine, (cosine,): sine}
         for factors, coefficient in self._terms_of(e).items():
@@ -62,7 +62,7 @@ class CommonForm:
         return total
 
     def _term(self, terms: list[tuple[Factors, Expr] | None]) -> Expr:
-        """One term for those of the alternatives; where one has none, its coefficient is 0 and its factors are another's."""
+        """One term for the corresponding terms of the alternatives; for an alternative that has none the coefficient is 0."""
         coefficient = self._choice([number(0.0) if term is None else term[1] for term in terms])
         given = next(term[0] for term in terms if term is not None)
         columns = zip(*(given if term is None else term[0] for term in terms), strict=True)
@@ -108,12 +108,12 @@ class CommonForm:
             return self._multiplied(*e.args)
         if e.op == "div" and e.args[1].degree == 0:
             return {factors: coefficient / e.args[1] for factors, coefficient in self._terms_of(e.args[0]).items()}
-        if e.op in ("sin", "cos") and e.args[0].degree is None:  # those of the time alone cost little as they are
+        if e.op in ("sin", "cos") and e.args[0].degree is None:  # sines and cosines of the time alone are cheap as they are
             return self._split(e)
         return {(e,): number(1.0)}
 
     def _multiplied(self, left: Expr, right: Expr) -> Terms:
-        """The product of two sums: taken apart where one of them has one term, so that no series is multiplied twice."""
+        """The product of two sums: expanded only if one of them has a single term, so that no series is multiplied twice."""
         a, b = self._terms_of(left), self._terms_of(right)
         single = [next(iter(terms.items())) if len(terms) == 1 else _peeled(e) for terms, e in ((a, left), (b, right))]
         (one, c), (other, d) = single
@@ -138,7 +138,7 @@ class CommonForm:
         return {cosine: combine("cos", shift), sine: -turn * combine("sin", shift)}
 
     def _kind(self, e: Expr) -> str:
-        """What kind of factor an expression is: its operation, and the leaves that change on which it depends."""
+        """The kind of a factor: its operation, and the non-constant leaves on which it depends."""
         if e not in self._kinds:
             leaves = sorted({repr(node) for node in ordered([e]) if not node.args and node.degree != 0})
             self._kinds[e] = f"{'sum' if self._is_sum(e) else e.op} of {', '.join(leaves)}"
@@ -149,7 +149,7 @@ class CommonForm:
 
 
 def _peeled(e: Expr) -> tuple[Factors, Expr]:
-    """An expression as a factor, and the coefficient that is before it."""
+    """An expression split into its factors and a coefficient."""
     coefficient = number(1.0)
     while e.op in ("mul", "div") and 0 in (e.args[-1].degree, e.args[0].degree if e.op == "mul" else None):
         constant, rest = e.args if e.args[0].degree == 0 else e.args[::-1]
@@ -158,5 +158,5 @@ def _peeled(e: Expr) -> tuple[Factors, Expr]:
 
 
 def _counted(factors: list[Expr]) -> list[tuple[Expr, int]]:
-    """Each factor with how often it is there, the most frequent ones first."""
+    """Each factor with its number of occurrences, the most frequent ones first."""
     return sorted({factor: factors.count(factor) for factor in factors}.items(), key=lambda item: -item[1])

@@ -5,8 +5,9 @@ at the j-th dotted path. With u = dq/dc and z = dv/dc it obeys, along an arc, u'
 
     z' = a_q u + a_v z + a_c.
 
-Everything here is at a fixed time: where c is the forcing frequency W, the kernel's time counts from `origin`, whole forcing
-periods after 0, and every load is a function of n W (origin + t), so a_c = a_W + (origin / W) a_t, a_t without the records.
+All derivatives are at a fixed time. If c is the forcing frequency W, one must note that the kernel's time counts from `origin`,
+whole forcing periods after 0, and that a load depends on n W (origin + t). Therefore a_c = a_W + (origin / W) a_t, where a_t
+leaves out the records.
 """
 
 from __future__ import annotations
@@ -24,17 +25,17 @@ FREQUENCY = "load.frequency"
 
 
 def check_paths(system: System, paths: tuple[str, ...]) -> tuple[str, ...]:
-    """The dotted paths to differentiate to, once each of them is known to name a number that can vary.
+    """Check that each of the dotted paths to differentiate to names a number that can vary.
 
     Raises
     ------
     ParameterError
-        A path that is not a number of the system, with the near ones; an order; a path given twice.
+        A path leads to no number of the system (the message has similar paths), or to an order, or is given twice.
     """
     known = [path for path, _ in numbers(system)]
     for path in paths:
         if path not in known:
-            system.get(str(path))  # refuses what leads nowhere
+            system.get(str(path))  # refuses a path to a part that does not exist
             below = [name for name in known if name.startswith(f"{path}.")]
             raise ParameterError(f"{path} is not a number, so there is no derivative to it; {near(str(path), below or known)}")
         owner = system.get(path.rpartition(".")[0])
@@ -50,10 +51,10 @@ def check_paths(system: System, paths: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def extend(trace: Trace, paths: tuple[str, ...]) -> None:
-    """Append the tangent's columns to a trace, as further coordinates: number dof + j dof + d is u_d of column j."""
+    """Append the tangent's columns to a trace as further coordinates; coordinate dof + j dof + d is u_d of column j."""
     own = list(trace.acceleration)
     trace.paths, trace.columns = paths, 2 * trace.dof + len(paths)
-    for path, order in list(trace.records):  # what the time derivative at a jump of the motion needs
+    for path, order in list(trace.records):  # the time derivative at a jump of the motion needs these
         if (path, order + 1) not in trace.records:
             trace.records.append((path, order + 1))
     for j in range(trace.columns):
@@ -61,7 +62,7 @@ def extend(trace: Trace, paths: tuple[str, ...]) -> None:
 
 
 def tangent_leaves(trace: Trace, j: int) -> tuple[list[Expr], list[Expr]]:
-    """u and z of column j: the coordinates and the velocities that stand for them."""
+    """The leaves for u and z of column j, as coordinates and velocities."""
     places = range(trace.dof * (1 + j), trace.dof * (2 + j))
     return [Expr("coordinate", (), i) for i in places], [Expr("velocity", (), i) for i in places]
 

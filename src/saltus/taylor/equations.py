@@ -1,4 +1,4 @@
-"""Which equations a system has: a digest of each part of what was traced of it, by which results know what they are of."""
+"""The identity of a system's equations: a digest of each traced part, which results carry so that changed models are noticed."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from saltus.taylor.system_structure import structure_key
 from saltus.taylor.tapes import tape
 from saltus.taylor.tracing import Trace, trace
 
-MOST_KNOWN = 64  # of the systems whose digests are kept: a study asks again and again for the same
+MOST_KNOWN = 64  # the most systems whose digests are kept, as a study asks for the same ones many times
 
 
 def equations_of(system: System) -> dict[str, str]:
-    """A digest of each part of a system's equations, its numbers left out: `System.to_json` has these.
+    """A digest of each part of a system's equations, without its numbers, which are in `System.to_json`.
 
-    The parts are `acceleration` (with the load's channels in it), `gap`, `contact` (where it is), `reset` (with the impact law in
-    it), `contacts` (of a model with several), `signs` (of its contacts), `margins`, `mirror` (the load of the mirror image) and
-    `names` (of coordinates, units, channels, sides and stops). What a model's Python reads from elsewhere, such as a constant of
-    its module, stands in the expressions as a number.
+    The parts are `acceleration` (including the load's channels), `gap`, `contact` (its position), `reset` (including the impact
+    law), `contacts` (of a model with several), `signs` (of its contacts), `margins`, `mirror` (the load of the mirror image) and
+    `names` (of coordinates, units, channels, sides and stops). Values that a model's Python reads from elsewhere, such as
+    constants of its module, are numbers in the expressions.
 
     Raises
     ------
     TraceError
-        A model that cannot be traced.
+        The model cannot be traced.
     """
     key = structure_key(system)
     with_numbers = key, system.to_json()
@@ -44,14 +44,14 @@ _known: dict[Any, dict[str, str]] = {}  # of systems with their numbers, on whic
 
 
 def _other_parts(system: System) -> dict[str, str]:
-    """The digests of what is not traced."""
+    """The digests of the parts that are not traced."""
     mirrored, model = system.mirrored(), system.model
     names = (model.coordinates, model.units, model.channels, model.sides, model.stops)
     return {"mirror": digest(repr(mirrored and mirrored.to_dict()["load"])), "names": digest(repr(names))}
 
 
 def _traced_parts(system: System) -> dict[str, str]:
-    """The digests of what was traced."""
+    """The digests of the traced parts."""
     traced = trace(system)
     roots: dict[str, list[Expr | None]] = {
         "acceleration": list(traced.acceleration),
@@ -66,7 +66,7 @@ def _traced_parts(system: System) -> dict[str, str]:
 
 
 def _margins(system: System) -> str:
-    """The margins as text, in which the names stand for themselves where they cannot be traced: they can then end no motion."""
+    """The margins as text; if they cannot be traced, and so cannot end a motion, their names take the place of expressions."""
     state = (0.1,) * len(system.model.coordinates)
     at: Any = state[0] if len(state) == 1 else state
     names = tuple(system.model.margins(0.0, at, at, at, (*system.model.sides, 1)[0], system.load))
@@ -78,7 +78,7 @@ def _margins(system: System) -> str:
 
 
 def _text(traced: Trace, roots: list[Expr]) -> str:
-    """Expressions as text, with the paths of parameters and records in the place of their numbers in the trace."""
+    """Expressions as text, in which parameters and records are given by their paths, not by their numbers in the trace."""
     paths: dict[str, list[Any]] = {"parameter": traced.parameters, "record": traced.records}
     written = tape(roots)
     nodes = [(node[0], paths[node[0]][node[1]]) if node[0] in paths else node for node in written.nodes]

@@ -1,8 +1,8 @@
-"""Whether two traced expressions are the same function: decided on their graphs, in exact arithmetic, and never by values.
+"""Proofs that two traced expressions are the same function, in exact arithmetic on their graphs, never by values.
 
-An expression becomes a polynomial with rational coefficients in its atoms, which are its leaves and the functions of such
-polynomials. Two expressions with one normal form are equal wherever both have a value. The converse does not hold:
-sin(x)^2 + cos(x)^2 is not known to be 1. So "equal" is proved, and anything else means only that no proof was found.
+An expression is written as a polynomial with rational coefficients in its atoms, which are leaves and functions of such
+polynomials. Two expressions with the same normal form are equal wherever both have a value. The converse does not hold: the
+normal form of sin(x)^2 + cos(x)^2 is not 1. Equality is thus proved; different normal forms prove nothing.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _atoms: dict[Hashable, int] = {}
 
 
 class NoNormalForm(Exception):
-    """What has no normal form, as it is not finite or too long: nothing is then proved of it."""
+    """An expression has no normal form, because it is not finite or too long, so that nothing is proved about it."""
 
 
 def normal_form(root: Expr, leaves: Mapping[Expr, Form] | None = None) -> Form:
@@ -36,7 +36,7 @@ def normal_form(root: Expr, leaves: Mapping[Expr, Form] | None = None) -> Form:
     Raises
     ------
     NoNormalForm
-        A number that is not finite, a division by 0, a polynomial that is too long.
+        The expression has a number that is not finite or a division by 0, or its polynomial is too long.
     """
     forms: dict[int, Form] = {id(leaf): form for leaf, form in (leaves or {}).items()}
     for node in ordered([root]):
@@ -101,7 +101,8 @@ def _times(one: Monomial, other: Monomial) -> Monomial:
 
 
 def _inverse(a: Form) -> Form:
-    """1 / a: of one term the term with its powers turned, of a sum an atom of the sum scaled to a first coefficient of 1."""
+    """1 / a: for a single term, the term with negative powers; for a sum, an atom of the sum scaled to a first coefficient of
+    1."""
     if not a:
         raise NoNormalForm
     first, factor = min(a.items())

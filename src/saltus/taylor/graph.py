@@ -13,7 +13,7 @@ import numpy as np
 from saltus.errors import TraceError
 from saltus.taylor.rules import FUNCTIONS
 
-# What a reset, evaluated at one instant, may use besides the operations that have a Taylor recurrence.
+# The operations without Taylor recurrence that a reset may use, because it is evaluated at one instant only.
 POINTWISE = ("greater", "less", "greater_equal", "less_equal", "where", "maximum", "minimum")
 LEAVES = ("number", "parameter", "time", "origin", "side", "free", "slide", "coordinate", "velocity", "acceleration", "record")
 RECORD_WIDTH = 5  # coefficients of a record's piece: a cubic spline of velocity makes a quartic displacement
@@ -145,7 +145,7 @@ class Expr:
 
 
 def _what_is_allowed(*operands: Any) -> str:
-    """What may be traced; of what changes with the sign of a velocity, that it may not."""
+    """A sentence that says what may be traced, and, for operands that depend on a velocity, that its sign may not be used."""
     return FRICTION if uses_velocity(*operands) else f"allowed are {ALLOWED}"
 
 
@@ -164,7 +164,7 @@ def _degree(op: str, args: tuple[Expr, ...]) -> int | None:
 
 
 def degree(op: str, degrees: list[int | None]) -> int | None:
-    """The degree of what an operation makes of series of these degrees, or None where it does not end."""
+    """The degree of the result of an operation on series of these degrees, or None if the resulting series does not end."""
     if all(d == 0 for d in degrees):
         return 0
     a, b = degrees[0], degrees[-1]
@@ -281,7 +281,7 @@ def ordered(roots: list[Expr]) -> list[Expr]:
 
 
 def is_steep(roots: list[Expr]) -> bool:
-    """Whether there is a function in the roots that may bend where a series from afar does not show it."""
+    """Whether the roots have a function that may bend sharply where a series from farther away does not show it."""
     return any(node.op in FUNCTIONS and FUNCTIONS[node.op].steep and node.degree is None for node in ordered(roots))
 
 

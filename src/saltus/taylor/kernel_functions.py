@@ -1,7 +1,8 @@
-"""The decorators of a kernel's functions in the files that hold them, where they compile nothing.
+"""The decorators of a kernel's functions, as seen by the files that contain these functions: they compile nothing.
 
-Such a file is text that kernels are made of (`compiled_part`), below a header with the decorators of the same names in
-`private_numba.py`, which compile. Imported as it stands it gives its constants, and its functions as plain Python.
+The text of such a file becomes a part of generated kernels (`compiled_part`), whose header imports the decorators with the same
+names from `private_numba.py`, which do compile. Imported directly, the file gives its constants, and its functions in plain
+Python.
 """
 
 from __future__ import annotations

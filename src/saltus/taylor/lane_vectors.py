@@ -72,7 +72,7 @@ operator_meaning(operator.neg, VectorType, vector_type, _on_vectors(operator.neg
 
 
 def _log2(a: Vec) -> Vec:
-    """log2 to 0.05, for a > 0: a line in every octave, as a number's bits are those of an integer that grows like that."""
+    """log2 to 0.05, for a > 0: linear in every octave, as is the integer that has the same bits as the number."""
     bits = a.builder.bitcast(a.value, LANES.of(LONG))
     return Vec(a.builder, a.builder.sitofp(bits, LANES.of(DOUBLE)), LANES) * 2.0**-52 - (1023.0 - 0.043)
 
@@ -184,6 +184,6 @@ bits = inlined(types.int64, _bits, 1)  # a mask as an integer: lane i is bit i
 mask = inlined(mask_type, _mask, 1)  # the mask of an integer's bits
 vector_lane = inlined(types.float64, _vector_lane, 2)  # the number in one lane
 with_lane = inlined(vector_type, _with_lane, 3)  # the vector with another number in one lane
-# Of an integer: the lowest bit that is set (there must be one), and how many are.
+# The place of the lowest bit that is set in an integer (there must be one), and the number of bits that are set.
 first_lane = inlined(types.int64, lambda builder, kinds, integer: builder.cttz(integer, BIT(1)), 1)
 lane_count = inlined(types.int64, lambda builder, kinds, integer: builder.ctpop(integer), 1)

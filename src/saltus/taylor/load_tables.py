@@ -1,8 +1,8 @@
-"""What a system's loads do between their breakpoints: the polynomials of records, and the clocks of pulses.
+"""Tables of a system's loads between their breakpoints: the polynomials of records, and the times that pulses depend on.
 
-A trace reads them by rows (dotted path, order). Of a record it is the order of the derivative. A pulse is a closed form of its
-own time, and its rows are polynomials of degree 1: SINCE, the time since its start, at most its length; its derivative WITHIN,
-1 within the pulse and else 0; AFTER, the time since its end, and one more, its derivative.
+A trace reads rows of such a table by (dotted path, order). For a record the order is that of the derivative. A pulse is a closed
+form in its own time; its rows are polynomials of degree 1: SINCE, the time since its start, at most its length; WITHIN, the
+derivative of SINCE, 1 within the pulse and else 0; AFTER, the time since its end; and the derivative of AFTER.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def record_table(system: System, rows: list[tuple[str, int]]) -> tuple[np.ndarra
 def record_tables(
     system: System, rows: list[tuple[str, int]], columns: Mapping[str, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The same for many sets of numbers, given in flat columns by dotted path.
+    """`record_table` for many sets of numbers, given in flat columns by dotted path.
 
     Returns
     -------
@@ -93,7 +93,7 @@ def _fill(row: np.ndarray, breaks: np.ndarray, record: Record, order: int) -> No
         row[1:][inside, power] = polynomial(anchors, nu=power) / factorial(power)
     if record.quantity == "force" or order >= 2:
         return
-    for after in (False, True):  # the ground goes on with the velocity it has
+    for after in (False, True):  # outside of the record the ground moves on with constant velocity
         edge = last if after else first
         where = np.append(False, breaks >= last) if after else np.append(True, breaks < first)
         anchor = np.append(breaks[0], breaks)[where]

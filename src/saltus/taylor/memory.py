@@ -1,4 +1,4 @@
-"""Where generated code finds what it reads, and puts what it makes: in the arguments of its function."""
+"""The memory of generated code: the arguments of its function, from which it reads and into which it writes."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ Place = tuple[str, int]  # an argument and, where it is an array, the element, r
 class Places:
     """The arguments of a function, and which of them holds the leaves of each kind, from which element on.
 
-    Leaves: `time`, `origin`, `side`; `coordinate`, `velocity`, `parameter`, `constant`, each as many as there are; and `record`.
-    Records lie in `table` and are expanded about the time; if another argument is given for them, they lie there as they are,
-    expanded about the time `record_time`.
+    The kinds of leaves are `time`, `origin`, `side`; `coordinate`, `velocity`, `parameter` and `constant`, of which there are
+    several; and `record`. Records are in `table`, and the code expands them about the time. If another argument is given for
+    them, it holds their coefficients already expanded about the time `record_time`.
     """
 
     arguments: tuple[str, ...]
@@ -65,7 +65,7 @@ class Memory:
         return number.value if isinstance(number, Vec) else self.arithmetic.constant(number or 0.0)
 
     def leaf(self, node: Node) -> Vec | float:
-        """A leaf's number, at the time for which they are given."""
+        """The number of a leaf, at the time for which the leaves are given."""
         op, *index = node
         if op == "number":
             return float(index[0])
@@ -92,7 +92,7 @@ class Memory:
         return self.leaves["record"][0] == "table"
 
     def _piece(self, row: int) -> Any:
-        """The coefficients of a record's current piece, as they lie in memory."""
+        """The coefficients of a record's current piece, as they are in memory."""
         name, first = self.leaves["record"]
         result = np.empty(RECORD_WIDTH, dtype=object)
         for k in range(RECORD_WIDTH):
@@ -107,7 +107,7 @@ class Memory:
         return b.gep(table.data, [b.add(b.mul(piece, table.shape[2]), LONG(k))])
 
     def _since(self) -> Any:
-        """The time since that which a record's coefficients count from."""
+        """The time since the instant from which a record's coefficients count."""
         time: Any = self.leaf(("time",))
         if not self._in_table:
             return time - self.load(self.leaves["record_time"])

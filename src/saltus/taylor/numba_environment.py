@@ -1,4 +1,4 @@
-"""What the environment may ask of numba that saltus cannot work with."""
+"""The check of environment variables of numba with which saltus cannot work."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from saltus.errors import SaltusError
 
 
 def check_environment() -> None:
-    """Refuse what numba would answer in its own words when it is imported, or, without its compiler, much later.
+    """Refuse settings that would make numba fail with its own message when it is imported, or, without its compiler, much later.
 
     Raises
     ------

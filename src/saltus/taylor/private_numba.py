@@ -1,21 +1,22 @@
-"""The one way in which saltus compiles, and the one file that uses what numba does not promise to keep.
+"""The one way in which saltus compiles, and the one file that uses parts of numba that are not public.
 
 saltus compiles with numba, without Python's exceptions for division and with fused multiply-adds. Tested with numba 0.60.0 and
 0.68.1 (see tests/taylor/test_private_numba.py); pyproject.toml allows these and all versions between.
 
-What numba promises is used as its documentation has it: `njit` and its options, `types`, the first-class function types, and the
-extension interface (`intrinsic`, `register_model`, `lower_builtin`, `type_callable`). These are not promised, and each has a
-plain answer where a numba lacks it:
+numba's public interface is used as documented: `njit` and its options, `types`, the first-class function types, and the extension
+interface (`intrinsic`, `register_model`, `lower_builtin`, `type_callable`). The following parts are not public; for each there is
+a fallback if a version of numba lacks it:
 
-* the option `_nrt`, which turns reference counting off: then references are counted, which costs time;
+* the option `_nrt`, which turns reference counting off. Without it references are counted, which costs time.
 * `FunctionCache`, its `_load_overload` and `rtsys`, with which compiled code is loaded from disk without the registries of all
-  that numba could compile, and `IndexDataCacheFile`, whose files get a digest: then numba's own `cache=True`;
-* what a function's library and context do when it has been compiled (`CPUContext`, `JITCodeLibrary`): machine code is made of
-  those functions only that are called from outside: then it is made of all, which takes twice as long;
-* a dispatcher's `get_call_template`, through which calls are typed without the numbers that are written out in them: then a
-  function is compiled once more for each of these numbers;
-* `FunctionModel` and a compile result's `library` and `entry_point`, with which a function's address is looked up once, is given
-  as a number, and calls skip numba's dispatch: then numba looks it up by Python code, at every call, and a Ctrl-C there is lost.
+  that numba could compile, and `IndexDataCacheFile`, whose files get a digest. Without them numba's own `cache=True` is used.
+* the methods of `CPUContext` and `JITCodeLibrary` that run after a function has been compiled. They are replaced so that machine
+  code is made only of functions that are called from outside. Without them it is made of all, which takes twice as long.
+* a dispatcher's `get_call_template`, through which calls are typed without the literal numbers in them. Without it a function is
+  compiled once more for each of these numbers.
+* `FunctionModel` and a compile result's `library` and `entry_point`, with which a function's address is looked up once and passed
+  as a number, and calls skip numba's dispatch. Without them numba looks it up by Python code at every call, where a Ctrl-C is
+  lost.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ from numba.extending import NativeValue, intrinsic, lower_builtin, models, regis
 
 
 def _private(module: str, name: str) -> Any:
-    """Something of numba's that may not be there: None then."""
+    """A private name of numba, or None if this version does not have it."""
     try:
         return getattr(importlib.import_module(module), name, None)
     except ImportError:
@@ -58,13 +59,13 @@ FUNCTION_MODEL = _private("numba.experimental.function_type", "FunctionModel")
 EXPERIMENTAL = _private("numba.core.errors", "NumbaExperimentalFeatureWarning")
 
 DIGEST = hashlib.sha256().digest_size  # bytes
-COMPILING = threading.RLock()  # held while numba's own methods are exchanged: two threads would put back each other's
+COMPILING = threading.RLock()  # held while methods of numba are replaced: two threads would restore each other's replacements
 
 log = logging.getLogger("saltus.cache")
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
-# For functions that only compiled code may call: numba writes no wrappers. Where they make no array either, it counts no
-# references, which would cost more than the work between two calls.
+# For functions that only compiled code calls: numba writes no wrappers. If they also make no arrays, it counts no references,
+# which would cost more than the work between two calls.
 WITHIN: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 LEAN: dict[str, Any] = {"_nrt": False} | WITHIN
 
@@ -84,20 +85,21 @@ def _njit(**options: Any) -> Callable[[Any], Any]:
 
 
 def _without_values(args: Any, kws: Any) -> tuple[Any, Any]:
-    """The types of a call's arguments without the numbers that are written out in it, for each of which numba compiles anew."""
+    """The types of a call's arguments with literal numbers made general: numba would compile anew for each literal."""
     return tuple(map(types.unliteral, args)), {name: types.unliteral(kind) for name, kind in kws.items()}
 
 
 jit = _njit(_nrt=True, **WITHIN)
 lean_jit = _njit(**LEAN)
-inline_jit = _njit(**LEAN, forceinline=True)  # for what every step of the lanes calls
+inline_jit = _njit(**LEAN, forceinline=True)  # for functions that every step of the lanes calls
 
 
 # --- compiled at once, and kept on disk ------------------------------------------------------------------------------------
 
 
 def _kept(function: Any) -> Any:
-    """A cache on disk that is read without the registries of all that numba could compile; None where numba has another one."""
+    """A cache on disk that is read without the registries of all that numba could compile; None if this numba has another
+    cache."""
     methods = ("_open_for_write", "_load_index", "_load_data")
     if RUNTIME is None or not hasattr(FUNCTION_CACHE, "_load_overload") or not all(hasattr(CACHE_FILE, m) for m in methods):
         return None
@@ -105,14 +107,14 @@ def _kept(function: Any) -> Any:
     class Kept(FUNCTION_CACHE):  # type: ignore[misc,valid-type]
         def __init__(self, py_func: Any) -> None:
             super().__init__(py_func)
-            # Beside the source, which is in a folder of the user's own; numba's settings may name any other one.
+            # Beside the source, in a folder of the user's own: numba's settings could name any other folder.
             self._cache_path = os.path.join(os.path.dirname(py_func.__code__.co_filename), "__pycache__")
             stamp = self._impl.locator.get_source_stamp()
             self._cache_file = _with_digests()(self._cache_path, self._impl.filename_base, stamp)
 
         def load_overload(self, sig: Any, target_context: Any) -> Any:
             """The code for a signature, or None."""
-            RUNTIME.initialize(target_context)  # without which arrays cannot be counted
+            RUNTIME.initialize(target_context)  # numba cannot count references to arrays before this
             with self._guard_against_spurious_io_errors():
                 return self._load_overload(sig, target_context)
 
@@ -121,7 +123,7 @@ def _kept(function: Any) -> Any:
 
 @cache
 def _with_digests() -> Any:
-    """numba's files of compiled code with the digest of their bytes at their ends, behind what numba reads."""
+    """A class for numba's files of compiled code that appends a digest of their bytes, behind the part that numba reads."""
 
     class CheckedFile(CACHE_FILE):  # type: ignore[misc,valid-type]
         @contextmanager
@@ -136,21 +138,22 @@ def _with_digests() -> Any:
 
         def _load_data(self, name: str) -> Any:
             if undamaged(self._data_path(name)) is None:
-                raise OSError("damaged")  # as if it were not there: it is compiled again
+                raise OSError("damaged")  # numba then compiles it again, as if the file were missing
             return super()._load_data(name)
 
     return CheckedFile
 
 
 def with_digest(content: bytes) -> bytes:
-    """What a file of compiled code holds: the code, and the digest of its bytes behind it."""
+    """The content of a file of compiled code: the code, followed by the digest of its bytes."""
     return content + hashlib.sha256(content).digest()
 
 
 def undamaged(path: str) -> bytes | None:
-    """What stands before the digest in a file of the user's own, or None; a file that is not so is removed, with a remark.
+    """The code in a file, without its digest, or None; a damaged file, a link or another user's file is removed, with a remark.
 
-    Anybody can make a digest: a file of another user, or a link, was planted while others could write to the folder.
+    The owner is checked because anybody can compute a digest: a file of another user, or a link, was planted while others could
+    write to the folder.
     """
     try:
         found = os.lstat(path)
@@ -184,9 +187,9 @@ def _compiled(signature: Any, **options: Any) -> Callable[[Any], Any]:
 
 @contextmanager
 def _machine_code_of(outer: Any) -> Iterator[None]:
-    """Within it machine code is made of this function only, with all that it calls in it.
+    """A context in which machine code is made of this function only, which then contains all functions that it calls.
 
-    numba would optimise all that it calls one by one, and make machine code of each, as if it were called from Python as well.
+    numba would optimise each called function by itself, and make machine code of it as if it were called from Python as well.
     """
     parts = [(CONTEXT, "get_executable"), (LIBRARY, "_optimize_final_module"), (LIBRARY, "_finalize_final_module")]
     if MAKE_FUNCTION is None or not all(hasattr(*part) for part in parts):
@@ -233,7 +236,7 @@ def cached_jit(signature: Any, nogil: bool = False) -> Callable[[Any], Any]:
 
 
 def pointed_jit(signature: Any, python: bool = False) -> Callable[[Any], Any]:
-    """The same for a function that makes no array and is called through pointers, or, if asked, from Python too."""
+    """As `cached_jit`, for a function that makes no array and is called through pointers, or, if asked, from Python too."""
     return _compiled(signature, _nrt=False, no_cpython_wrapper=not python)
 
 
@@ -242,7 +245,7 @@ def pointed_jit(signature: Any, python: bool = False) -> Callable[[Any], Any]:
 
 @contextmanager
 def pointers() -> Iterator[None]:
-    """Within it numba does not remark that calls through pointers are experimental; the tests run every kernel through them."""
+    """A context without numba's warning that calls through pointers are experimental; the tests run every kernel through them."""
     with warnings.catch_warnings():
         if EXPERIMENTAL is not None:
             warnings.simplefilter("ignore", EXPERIMENTAL)

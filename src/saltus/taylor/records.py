@@ -1,4 +1,4 @@
-"""Records of samples inside a kernel: the pieces of polynomials that they are made of, expanded about a time.
+"""Records of samples inside a kernel: their piecewise polynomials, expanded about a time.
 
 This part is compiled together with the lanes; `memory.py` runs the same functions while it writes the code of one motion.
 """
@@ -18,7 +18,7 @@ def anchor(breaks, piece):
 
 @jit
 def own_records(tables, trajectory):
-    """The breakpoints and the table of one trajectory; there is one of each for all where none of them moves."""
+    """The breakpoints and the table of one trajectory; all trajectories share one of each if no breakpoint depends on it."""
     breaks, table = tables
     i = min(trajectory, breaks.shape[0] - 1)
     return breaks[i], table[i]

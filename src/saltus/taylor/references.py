@@ -1,4 +1,4 @@
-"""Tuples that the functions of a kernel are given by their address, in numba's extension interface."""
+"""Tuples that are passed to the functions of a kernel by their address, in numba's extension interface."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from numba.extending import intrinsic, lower_builtin, lower_cast, models, regist
 
 
 class Reference(types.BaseTuple):
-    """A tuple that functions are given by its address; one of many arrays would be hundreds of arguments, at every call."""
+    """The type of a tuple that is passed by its address; passed by value, a tuple of many arrays would be hundreds of
+    arguments."""
 
     def __init__(self, of: Any) -> None:
         super().__init__(name=f"Reference({of})")
@@ -31,7 +32,7 @@ class Reference(types.BaseTuple):
 
 @register_model(Reference)
 class ReferenceModel(models.PrimitiveModel):
-    """Where the tuple is."""
+    """The address of the tuple."""
 
     def __init__(self, manager: Any, kind: Any) -> None:
         super().__init__(manager, kind, manager.lookup(kind.of).get_value_type().as_pointer())  # type: ignore[no-untyped-call]
@@ -55,7 +56,7 @@ def _tuple_there(context: Any, builder: Any, given: Any, wanted: Any, value: Any
 
 @intrinsic
 def by_reference(typing: Any, given: Any) -> Any:
-    """A tuple as a `Reference`, for as long as the function lasts that asks; its caller holds the arrays."""
+    """A tuple as a `Reference`, valid until the function that makes it returns; the caller of that function owns the arrays."""
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         place = cgutils.alloca_once(builder, args[0].type)

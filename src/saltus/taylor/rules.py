@@ -1,12 +1,12 @@
 """The elementary functions, each in one rule, and the Taylor recurrences of arithmetic.
 
 An elementary function y = f(u) is added to everything (tracing, derivatives, one motion, ensembles) by one entry of FUNCTIONS
-under the name that it has in the C library: NumPy's function, its slope f'(u) in terms of u and y, written with NumPy, and what
-else is known of it. The Taylor coefficients follow from y' = f'(u) u', as the slope is a series like any other,
+under its name in the C library: NumPy's function, its slope f'(u) in terms of u and y, written with NumPy, and optional
+properties. The Taylor coefficients follow from y' = f'(u) u', as the slope is a series like any other,
 
     k y_k = sum_{j=1}^{k} j u_j s_{k-j},    s = f'(u).
 
-Where a recurrence is known that needs no series of the slope, as for the logarithm, the entry gives it. The tests go through the
+If there is a recurrence that needs no series of the slope, as for the logarithm, the entry gives it. The tests go through the
 table and compare each function's coefficients with 40 digits (tests/taylor/test_series.py).
 """
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from saltus.taylor.sums import Row
     from saltus.taylor.vectors import Coefficient
 
-Rule = Callable[..., None]  # of the writer, the node's own series, which lacks the coefficient of this order, and its operands'
+Rule = Callable[..., None]  # arguments: the writer, the node's own series (still without this order), its operands' series
 
 
 @dataclass(frozen=True)
@@ -35,9 +35,10 @@ class Function:
     numpy: Callable[..., Any]
     slope: Callable[[Any, Any], Any]  # f'(u) of u and y
     increasing: bool = False  # wherever it is defined: its bounds over an interval are then its values at the ends
-    # Whether high Taylor terms, below rounding where it is expanded, may bend it sharply within a step: such steps are checked.
+    # Whether the function may change steeply within a step although its Taylor terms are below rounding at the step's start;
+    # steps are then checked.
     steep: bool = False
-    recurrence: Rule | None = None  # in place of the one that follows from the slope
+    recurrence: Rule | None = None  # used in place of the recurrence that follows from the slope
 
 
 def by_slope(w: Series, own: Row, u: Row, slope: Row, factor: float, name: str) -> None:

@@ -5,8 +5,8 @@ a product of two series takes for both orders a sum over coefficients that lie i
 
     sum_{j=1}^{k-1} a_j b_{k-j}    and    sum_{j=1}^{k-1} a_j b_{k+1-j}.
 
-An inner loop makes both (see `sums.py`). What the newest coefficients add comes after it. A series that ends, as the time's
-does, needs no loop: its few terms are written out.
+An inner loop computes both (see `sums.py`). The terms with the newest coefficients are added after it. A series that ends, such
+as that of the time, needs no loop: its few terms are written out.
 """
 
 from __future__ import annotations
@@ -28,18 +28,19 @@ from saltus.taylor.vectors import CACHE_LINE, DOUBLE, LONG, Coefficient, Vec, ad
 
 @dataclass(frozen=True)
 class Rows:
-    """Where the coefficients of a motion are put, and how many there may be.
+    """The places of the coefficients of a motion, and their largest number.
 
     The first roots of the tape are the accelerations, one for each position. With `any_order` the function's argument `order` is
-    the highest order of the roots, whichever it is; else it is how many orders they have, even and not below those written out.
+    the highest order of the roots, odd or even; else it is the number of their orders, even and at least that of the orders
+    written out.
     """
 
     positions: Sequence[Place]
     velocities: Sequence[Place]
-    roots: Sequence[Place | None]  # None: not kept
+    roots: Sequence[Place | None]  # where the series of each root is stored; None: it is not kept
     capacity: int  # the most coefficients of a series
     any_order: bool
-    numbers: Sequence[Place] = ()  # of further roots that do not change
+    numbers: Sequence[Place] = ()  # where further roots that do not change are stored
 
 
 class Series:
@@ -51,7 +52,7 @@ class Series:
         self.ahead: int | None = None  # of a pair: 0 at order k, 1 at order k + 1; None among the first
         self.positions = [Row(None, True, place=memory.pointer(place)) for place in layout.positions]
         self.velocities = [Row(None, True, place=memory.pointer(place)) for place in layout.velocities]
-        self._nodes: dict[int, Node] = {}  # that the rows are for
+        self._nodes: dict[int, Node] = {}  # the node of each row, by the row's id
         self._scaled: dict[int, Row] = {}
         self._records: dict[int, Any] = {}
         self._inverses: dict[int, Any] = {}
@@ -64,7 +65,7 @@ class Series:
             self.rows.append(self._row(node))
             self._nodes.setdefault(id(self.rows[-1]), node)
         highest = max((row.degree for row in self.rows if row.degree is not None), default=0)
-        self.written_out = 2 * (highest // 2 + 1)  # how many orders are
+        self.written_out = 2 * (highest // 2 + 1)  # the number of orders whose code is written out
         if not memory.arithmetic.exact:
             self._table = constant_table(self.builder, [1.0 / max(k, 1) for k in range(layout.capacity + 2)])
 
@@ -107,7 +108,7 @@ class Series:
     # --- the orders ------------------------------------------------------------------------------------------------------------
 
     def _each_order(self) -> Iterator[None]:
-        """Go through all orders: what is written meanwhile is for one of the first orders, or for one of a pair."""
+        """Iterate over all orders; code that is written in an iteration is for one of the first orders, or for one of a pair."""
         b, any_order, order = self.builder, self.layout.any_order, self.memory.arguments["order"]
         order = b.add(order, LONG(1)) if any_order else order
         end = b.append_basic_block("end")
@@ -216,7 +217,7 @@ class Series:
         return row.pair[self.ahead] if row.degree is None else None
 
     def scaled(self, u: Row, newest: bool = True) -> Row:
-        """j u_j, up to this order, or up to the one before where u has no more."""
+        """The series j u_j, up to this order, or up to the one before if u is not known further."""
         row = self._scaled.setdefault(id(u), Row(u.degree, u.early))
         if not newest:
             return row
@@ -229,7 +230,7 @@ class Series:
         return row
 
     def _scaled_now(self, u: Row) -> Coefficient:
-        """j u_j at this order of a pair, from velocities if u is made of positions and what does not change: known sooner so."""
+        """j u_j at this order of a pair; from velocities, which are known sooner, if u is made of positions and constants."""
         op, *places = self._nodes.get(id(u), ("",))
         if op == "coordinate":
             return self._back(self.velocities[places[0]], 1)
@@ -271,7 +272,7 @@ class Series:
         if self.ahead == 1:
             newest += [(False, forward.pair[0], backward.first[1])]
             newest += [] if backward.early else [(False, forward.first[1], backward.pair[0])]
-        newest.sort(key=lambda term: not term[0])  # what is known last is added last
+        newest.sort(key=lambda term: not term[0])  # terms that are known last are added last
         return dot([(one, other) for _, one, other in newest], self._earlier(forward, backward)[self.ahead])
 
     # --- memory ----------------------------------------------------------------------------------------------------------------
@@ -294,11 +295,11 @@ class Series:
         return multiply(self.memory.arithmetic.everywhere(self.builder, inverse), value)
 
     def _before_sums(self, row: Row) -> AbstractContextManager[Any]:
-        """Where the code for a series' coefficient goes: before the sums if it can."""
+        """The place for the code of a series' coefficient: before the sums if all that it needs is known there."""
         return self.builder.goto_block(self._head) if self.ahead == 0 and row.early else nullcontext()
 
     def _back(self, row: Row, j: int) -> Coefficient:
-        """The coefficient of the order that is j below this one, of a pair."""
+        """A row's coefficient j orders below the present one, while a pair of orders is written."""
         if j == 0:
             return self.now(row)
         if j == self.ahead:
@@ -326,7 +327,7 @@ class Series:
         return self._sums[key]
 
     def _at(self, row: Row, index: Any) -> Vec:
-        """A coefficient from memory, where the series is from now on."""
+        """A coefficient from memory; the series is kept in memory from now on."""
         if row.place is None:
             with self.builder.goto_entry_block():
                 row.place = self.builder.alloca(self._kind, self.layout.capacity)
@@ -342,7 +343,7 @@ class Series:
         return self.memory.arithmetic.of(DOUBLE)
 
     def _keep(self, row: Row, first: Any) -> None:
-        """Have a series in memory: the first orders from the block `first` on, the orders of a pair from here on."""
+        """Keep a series in memory: its first orders from the block `first` on, and the orders of pairs from here on."""
         ended = [None] * (self.layout.capacity - len(row.first)) if row.degree is not None else []
         with self.builder.goto_block(first):
             for j, value in enumerate([*row.first, *ended]):
@@ -359,7 +360,7 @@ def _needs_sums(op: str, degrees: list[int | None]) -> bool:
 
 
 def constant_table(builder: Any, numbers: list[float]) -> Any:
-    """LLVM's pointer to an array of numbers that the code carries along."""
+    """LLVM's pointer to an array of constants in the compiled code."""
     values = ir.Constant(ir.ArrayType(ir.DoubleType(), len(numbers)), numbers)
     module = builder.module
     table = ir.GlobalVariable(module, values.type, module.get_unique_name("numbers"))

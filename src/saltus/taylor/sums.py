@@ -1,7 +1,7 @@
-"""The sums of products of two series for the orders k and k + 1, made in loops over coefficients in memory.
+"""The sums of products of two series for the orders k and k + 1, computed in loops over coefficients in memory.
 
-A loop makes those of up to `most_sums` products: what it loads serves both orders, and its code is so short that the processor
-keeps it decoded; written out order by order a call took 5 to 30 % longer at orders 12 to 20.
+A loop computes the sums of up to `most_sums` products. Each loaded coefficient serves both orders, and the code is so short that
+the processor keeps it decoded; with all orders written out a call took 5 to 30 % longer at orders 12 to 20.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 class SeriesSettings:
     """How the code of series is laid out."""
 
-    # Products of an inner loop: their sums and what they load fit into the registers of AVX-512 and of AVX2.
+    # The most products in an inner loop, whose sums and loaded coefficients fit into the registers of AVX-512 and of AVX2.
     most_sums: int = 3
-    # The highest degree of a series whose end is made use of; the orders that are written out for it must be fewer than the
-    # lowest order of an ensemble's series.
+    # The highest degree of a polynomial whose vanishing coefficients are left out of the sums. The orders that are written out
+    # for it must be fewer than the lowest order of an ensemble's series.
     most_ending: int = 7
 
 
@@ -54,7 +54,7 @@ class InnerLoop:
 
     @property
     def full(self) -> bool:
-        """Whether it should make no further sums."""
+        """Whether the loop has as many sums as it should."""
         return self._made == SETTINGS.most_sums
 
     def sums(self, forward: Row, backward: Row) -> tuple[Vec, Vec]:
@@ -78,7 +78,7 @@ class InnerLoop:
         return self._loaded[key]
 
     def _before(self, row: Row, loaded: Vec) -> Vec:
-        """Coefficient k + 1 - j: what the turn before loaded."""
+        """Coefficient k + 1 - j, which the iteration before has loaded."""
         if id(row) not in self._carried:
             variable = self._variable(self.series._kind)
             start = self.series.memory.value(row.pair[0] if row.early else None)

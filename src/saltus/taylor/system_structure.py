@@ -1,4 +1,4 @@
-"""What the traced equations of a system depend on: all of it but its numbers, by which what was made of them is kept."""
+"""The structure of a system: everything except its numbers, which is all that its traced equations depend on."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from saltus.systems import Record, children, is_number
 
 
 def structure_key(node: Any) -> Any:
-    """What a system's structure depends on: the types of its parts, what these read from their modules, and whatever in them is
-    not a number."""
-    if isinstance(node, Record):  # its samples are numbers, and its scale; where they came from does not matter
+    """A key of a system's structure, under which traces are kept: the types of its parts, the values that these read from their
+    modules, and all of their fields that are no numbers."""
+    if isinstance(node, Record):  # its samples and its scale are numbers; the file that they came from does not matter
         return Record, node.quantity
     parts = children(node)
     if parts:
@@ -34,7 +34,8 @@ def structure_key(node: Any) -> Any:
 
 @cache
 def _outside(cls: type) -> tuple[tuple[Mapping[str, Any], str], ...]:
-    """Where the numbers stand that the methods of a user's class read from its module or class: a trace holds their values."""
+    """The names and namespaces of values that the methods of a user's class read from its module or class; a trace contains these
+    values."""
     found: dict[tuple[int, str], tuple[Mapping[str, Any], str]] = {}
     owners = [owner for owner in cls.__mro__ if owner.__module__.partition(".")[0] not in ("saltus", "builtins")]
     waiting = [value for owner in owners for value in vars(owner).values()]

@@ -1,4 +1,4 @@
-"""Tapes: the nodes of expressions as a list, operands before what uses them, in which form they stand in a generated file.
+"""Tapes: the nodes of expressions as a list, operands before the nodes that use them, which is their form in a generated file.
 
 A node is a tuple of its operation and its operands' places on the tape, or of a leaf's kind and its index or value. In a tape
 for series an elementary function names, besides its argument, the series of its slope and a factor of it (see `rules.py`). The
@@ -31,7 +31,7 @@ class Tape:
 
 
 def shared_constants(roots: Sequence[Expr]) -> Constants:
-    """The largest parts of the roots that depend on parameters alone: they are computed once for a motion, into a table."""
+    """The largest parts of the roots that depend on parameters alone; they are computed once for a motion and kept in a table."""
     fixed: dict[int, bool] = {}
     table: Constants = {}
     for node in ordered(list(roots)):
@@ -49,7 +49,8 @@ def _enter(table: Constants, nodes: list[Expr]) -> None:
 
 
 def tape(roots: Sequence[Expr], known: Constants | None = None, series: bool = False) -> Tape:
-    """The tape of the roots; what the table `known` holds is not opened. For series the slopes of functions stand on it too."""
+    """The tape of the roots; parts that are in the table `known` are leaves of it. For series it has the slopes of functions
+    too."""
     nodes: list[Node] = []
     place: dict[int, int] = {}
     known, waiting = known or {}, list(reversed(roots))
@@ -72,7 +73,7 @@ def tape(roots: Sequence[Expr], known: Constants | None = None, series: bool = F
 
 
 def _below(root: Expr, placed: dict[int, int], known: Constants) -> list[Expr]:
-    """The nodes below a root that are not placed yet, operands first; what is known is not opened."""
+    """The nodes below a root that are not on the tape yet, operands first; parts that are known are leaves."""
     found: dict[int, Expr] = {}
     stack = [(root, False)]
     while stack:
@@ -88,7 +89,7 @@ def _below(root: Expr, placed: dict[int, int], known: Constants) -> list[Expr]:
 
 
 def _factored(slope: Expr) -> tuple[Expr, float]:
-    """A slope as a series that the motion may need anyway, times a number: of a cosine the sine, times -1."""
+    """A slope as a number times an expression that the tape may have anyway; for a cosine, -1 times the sine."""
     if slope.op == "mul" and slope.args[0].op == "number":
         return slope.args[1], slope.args[0].value
     return slope, 1.0

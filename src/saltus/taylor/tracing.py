@@ -39,10 +39,10 @@ if TYPE_CHECKING:
 
 
 class LoadTime:
-    """The time that a traced model hands to its load channels, and to nothing else.
+    """The time in a traced model, which may be passed to load channels only.
 
-    The flow counts whole forcing periods apart and keeps a local time within them, so a model may depend on the time
-    only through its load, where that is exact.
+    The flow counts whole forcing periods and keeps a local time within them. A model may therefore depend on the time only
+    through its load, for which this representation is exact.
     """
 
     def __init__(self, trace: Trace) -> None:
@@ -67,7 +67,7 @@ class LoadTime:
         return Expr("record", (), self._trace.records.index(row))
 
     def refuse(self, *_: Any) -> Any:
-        """The answer to every other use."""
+        """Raise an error for every other use."""
         raise TraceError(
             "the time may only be handed to a load channel, such as load.horizontal(t); give the model a channel for it"
         )
@@ -79,7 +79,7 @@ class LoadTime:
 
 
 class DeclaredLoad:
-    """The load that a traced model sees: the channels that it names, so that a misspelt one is not read as 0."""
+    """The load in a traced model: it has only the channels that the model declares, so that a misspelt name is not read as 0."""
 
     def __init__(self, load: Any, model: Any) -> None:
         self._load, self._model = load, model
@@ -99,10 +99,11 @@ class Trace:
     `contact_acceleration`, the second derivative of the gap at rest at contact, a function of the time alone, and
     `contact_damping`, minus its derivative to the velocity; `next_side` and `velocity_after`, the reset; `margins` to stop at.
 
-    Of a model with contacts: `reactions`, one for each; `mass`, the rows of the mass matrix one after the other; `restitution`, E
-    likewise; `positions` of the contacts. Leaves are then also `free`, 1 for each coordinate that no contact holds, else 0.
-    Of a model with frictions: behind the reactions of the contacts the two margins of each friction (`stick_margins`), and
-    `ground_speeds`. Leaves are then also `slide`, the direction in which each slides, 0 where it sticks.
+    A model with several contacts has `reactions`, one for each; `mass`, the rows of the mass matrix one after the other;
+    `restitution`, the rows of E; and `positions` of the contacts. Its leaves include `free`, 1 for each coordinate that no
+    contact holds, else 0. A model with frictions has, behind the reactions of the contacts, the two margins of each friction
+    (`stick_margins`), and `ground_speeds`. Its leaves include `slide`, the direction in which each friction slides, 0 if it
+    sticks.
 
     With `columns` of a tangent (`derivatives.py`) `acceleration` goes on after the model's own `dof` with those of the columns.
     """
@@ -149,16 +150,17 @@ class Trace:
 
 
 def trace(system: System, stop_at: tuple[str, ...] = (), sensitivities: tuple[str, ...] | None = None) -> Trace:
-    """Trace the model, the load and the impact law of a system, and the margins that a motion stops at.
+    """Trace the model, the load and the impact law of a system, and the margins at which a motion stops.
 
-    Given dotted paths (maybe none), trace the tangent as well: the derivatives to the state at the start and to those numbers.
+    If `sensitivities` is given, as dotted paths (maybe none), the tangent is traced as well: the derivatives to the state at the
+    start and to the numbers at these paths.
 
     Raises
     ------
     TraceError
-        An operation without a Taylor recurrence, a branch on the state, a time used outside the load.
+        There is an operation without a Taylor recurrence, a branch on the state, or a use of the time outside the load.
     ParameterError
-        A margin that the model does not have; a path to no number.
+        The model does not have a margin, or a path leads to no number.
     """
     paths = None if sensitivities is None else tangent.check_paths(system, sensitivities)
     result = Trace(model=type(system.model).__name__, sides=len(system.model.sides), dof=len(system.model.coordinates))
@@ -193,19 +195,19 @@ def ask(model: Any, method: str, *arguments: Any) -> Any:
     Raises
     ------
     TraceError
-        Any other exception than saltus's own, with its type and text (and itself as the cause).
+        The method raised an exception that is not saltus's own; the message has its type and text, and it is the cause.
     """
     try:
         return getattr(model, method)(*arguments)
     except (SaltusError, KeyboardInterrupt):
         raise
-    except BaseException as error:  # a user's own code may end in an exit
+    except BaseException as error:  # a user's own code may call exit
         name = f"{type(model).__name__}.{method}"
         raise TraceError(f"{name} failed while it was traced: {type(error).__name__}: {error}") from error
 
 
 def _name_records(load: Any) -> None:
-    """Tell every record and pulse of a symbolic load its path: its breakpoints are looked up when the numbers are known."""
+    """Give every record and pulse of a symbolic load its path, by which its breakpoints are found when the numbers are known."""
     for name, signal in load.channels.items():
         terms = {f"load.{name}.{i}": term for i, term in enumerate(getattr(signal, "terms", ()))}
         for path, term in (terms or {f"load.{name}": signal}).items():
@@ -230,7 +232,8 @@ def _trace_contact(result: Trace, twin: Any, t: LoadTime, q: tuple[Expr, ...], v
 
 
 def _check_gap(gap: Expr, coordinate: Expr, model: str) -> None:
-    """Refuse a gap that is not, for certain, a polynomial of degree 1 in the coordinate: the flow has one contact point."""
+    """Refuse a gap that is not provably a polynomial of degree 1 in the coordinate, as the flow assumes a single contact
+    point."""
     slope = differentiate(gap, coordinate)
     if _known_number(differentiate(slope, coordinate)) != 0:
         raise TraceError(
@@ -252,7 +255,7 @@ def _check_next_side(next_side: Expr, sides: tuple[int, ...], model: str) -> Non
 
 
 def _known_number(expression: Expr) -> float | Fraction | None:
-    """The number that an expression is for certain, or None."""
+    """The number to which an expression is provably equal, or None."""
     if not expression.args:
         value: float | None = expression.value if expression.op == "number" else None
         return value
@@ -265,7 +268,7 @@ def _known_number(expression: Expr) -> float | Fraction | None:
 
 
 def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> list[Any]:
-    """The accelerations of a model with contacts, any of which may be closed."""
+    """Trace the accelerations of a model with several contacts, for any choice of closed ones."""
     model, load, count = twin.model, twin.load, len(twin.model.coordinates)
     free = [Expr("free", (), i) for i in range(count)]
     slides = [Expr("slide", (), k) for k in range(len(model.frictions))]
@@ -305,7 +308,7 @@ def _trace_margins(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any, side: 
 
 
 def _check(result: Trace) -> None:
-    """Refuse comparisons in what is expanded in series, and a gap that depends on more than the coordinate."""
+    """Refuse comparisons in expressions that are expanded in series, and a gap that depends on more than the coordinate."""
     expanded = [*result.acceleration, *result.reactions, *result.margins.values()]
     if result.gap is not None:
         expanded += [result.gap]
@@ -322,12 +325,12 @@ def _check(result: Trace) -> None:
 
 
 def check_size(traced: Trace, lanes: bool = False) -> None:
-    """Refuse equations that would be compiled for minutes or hours: the time grows as the square of the number of loops.
+    """Refuse equations whose compilation would take minutes or hours; the time grows as the square of the number of loops.
 
     Raises
     ------
     TraceError
-        With the estimate for one motion, for its derivatives if they are traced, or for vector `lanes`.
+        The message has the estimate for one motion, for its derivatives if they are traced, or for vector `lanes`.
     """
     expanded = [*traced.acceleration, *traced.reactions, *traced.margins.values(), *([] if traced.gap is None else [traced.gap])]
     loops, nodes = loop_count(expanded), len(ordered(expanded))
@@ -343,7 +346,7 @@ def check_size(traced: Trace, lanes: bool = False) -> None:
 
 
 def _check_abs(result: Trace, expanded: list[Expr]) -> None:
-    """Refuse abs of a coordinate, traced as side * coordinate, where that is not its meaning."""
+    """Refuse abs of a coordinate, which is traced as side * coordinate, in models in which the two differ."""
     side, coordinates = Expr("side"), [Expr("coordinate", (), i) for i in range(len(result.acceleration))]
     sized = {side * q for q in coordinates}
     if result.gap not in sized | {q * side for q in coordinates} and any(node in sized for node in ordered(expanded)):

@@ -1,7 +1,7 @@
-"""What arithmetic is written on: one double, or a vector of doubles with one for each lane.
+"""The numbers of generated arithmetic: one double, or a vector of doubles with one for each lane.
 
 `Vec` stands for such a number while LLVM's code is written: Python's operators append instructions. None stands for a number
-that is known to be zero, and a float for one that is known.
+that is known to be zero, and a float for any other number that is known.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from llvmlite import binding, ir
 
 DOUBLE, BIT, LONG, INDEX = ir.DoubleType(), ir.IntType(1), ir.IntType(64), ir.IntType(32)
 CACHE_LINE = 64  # bytes
-FUSED = ("contract", "nsz")  # what arithmetic may do besides IEEE: fused multiply-adds
+FUSED = ("contract", "nsz")  # LLVM's flags that allow fused multiply-adds
 
 
 def host_width() -> int:
     """How many lanes suit this machine: 16 with AVX-512, 4 with AVX2, 2 with SSE2 or NEON, else 1.
 
-    With AVX-512 a vector takes two registers: while the processor waits for the sums in one it works on those in the other, and
-    a step takes some 10 % less for each lane.
+    With AVX-512 a vector takes two registers: while the processor waits for the sums in one, it works on those in the other, so
+    that a step takes about 10 % less time for each lane.
 
     The environment variable SALTUS_LANES overrides it, for tests: the results are the same.
     """

@@ -1,1 +1,1 @@
-"""Motions with several contacts, each of which holds one coordinate while it is closed and pushed."""
+"""Motions with several contacts; each holds one coordinate while it is closed and its reaction pushes."""

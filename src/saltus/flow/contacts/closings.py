@@ -1,23 +1,24 @@
-"""Contacts that close: one, or several at one instant, as those of cells that move alike.
+"""Contacts that close, one alone or several at one instant, as in cells that move alike.
 
-Contacts of different blocks of the mass matrix, which E does not connect either, do not act on one another at an impact: no
-impulse of one changes the rate of another's gap. They are taken one after the other. Beside the motion their instants differ, by
-t_1 and t_2; with the rates f of the state, f_1 those after the first impact alone, and the derivatives R of the impacts, the
-columns x then become
+Contacts whose coordinates neither the mass matrix nor E couples belong to different blocks. They do not act on one another at an
+impact, since no impulse of one changes the rate of another's gap, and their impacts are applied one after the other. In a
+neighbouring motion these impacts happen at different instants, shifted by t_1 and t_2. Let f be the time derivative of the state
+(f_0 before the impacts, f_1 and f_2 after one of them alone, f_12 after both), and R_1, R_2 the derivatives of the impact maps.
+At a fixed time the columns x of the tangent then become
 
-    R_2 (R_1 (x + f_0 t_1) + f_1 (t_2 - t_1)) - f_12 t_2
+    R_2 (R_1 (x + f_0 t_1) + f_1 (t_2 - t_1)) - f_12 t_2,
 
-at a fixed time, which is linear in x. It is the derivative if the other order gives the same, so if
+which is linear in x. It is the derivative if the other order of impacts gives the same result, that is, if
 
-    (R_2 f_1 + R_1 f_2 - R_2 R_1 f_0 - f_12) (t_2 - t_1) = 0,
+    (R_2 f_1 + R_1 f_2 - R_2 R_1 f_0 - f_12) (t_2 - t_1) = 0.
 
-and else only that from one side. Both orders are tried. Springs between cells, whose forces do not jump, pass; a damper between
-them does not: what it gives to a mass in between, after the impact of the other one, is turned round by its own impact, or is
-not. (It passes where that leaves no speed, with e = 0.) Contacts of one block that close together have a derivative to what
-keeps them together.
+Otherwise there are only one-sided derivatives. Both orders are therefore tried. With springs between cells, whose forces do not
+jump, they agree. With a damper between them they differ: the impact of one mass changes the damper's force on the other mass, and
+the other mass's own impact reverses the effect of this force only if it comes later (no difference remains with e = 0, where the
+impact leaves no speed). Contacts of one block that close together have a derivative along columns that keep them together.
 
-Impacts that die away in several blocks at one instant end in a row likewise. Their order makes no difference, as they leave no
-speed. Nothing jumps at a release, of however many contacts.
+Accumulations of impacts in several blocks that end at one instant are also treated one after the other. Their order makes no
+difference, as no speed is left. At a release nothing jumps, however many contacts open.
 
 Its compiled part goes into one module with that of `contacts_kernel.py`, whose docstring defines the arguments.
 """
@@ -66,7 +67,7 @@ from saltus.taylor import jit, lean_jit
 
 @lean_jit
 def is_there(where, solver, own, count, place):
-    """Whether one of the numbers of the contacts, or its derivative along a column, is not 0."""
+    """Whether one of the entries of `NUMBERS`, or its derivative along a column, is not 0."""
     found = solver[Solver.NUMBERS][place] != 0.0
     for j in range(where[Where.COLUMNS]):
         found = found or slope(solver, own, count, j, place) != 0.0
@@ -75,7 +76,8 @@ def is_there(where, solver, own, count, place):
 
 @jit
 def block_of(where, state, env, model, contacts, solver, hit, backwards):
-    """The contacts that mass matrix or E connect with the first of those in `hit`, or with the last, as bits."""
+    """The block of the first contact in `hit`, or of the last: the contacts that the mass matrix or E couples with it, as
+    bits."""
     own, count = where[Where.OWN], contacts.shape[0]
     joined, start, grows, block = np.zeros(own, np.bool_), 0, True, 0
     couple(where, state, env, model, contacts, solver)
@@ -102,7 +104,7 @@ def block_of(where, state, env, model, contacts, solver, hit, backwards):
 
 @lean_jit
 def impact_of(where, state, env, model, contacts, work, solver, t, origin, hit):
-    """Apply the impact law to all contacts whose gap is 0 but those that close later; an `ImpactDetail`, or -1 if it fails."""
+    """Apply the impact law to the contacts in `hit` and to those that are closed; an `ImpactDetail`, or -1 if it fails."""
     own, count, detail = where[Where.OWN], contacts.shape[0], int(ImpactDetail.REGULAR)
     regular, chosen = couple(where, state, env, model, contacts, solver), hit
     for i in range(count):
@@ -130,7 +132,8 @@ def impact_of(where, state, env, model, contacts, work, solver, t, origin, hit):
 
 @lean_jit
 def rates_between(where, state, env, model, contacts, frictions, work, solver, t, origin, hit):
-    """Fill the accelerations after some of the impacts, of `hit` the last; returns the closed contacts that open, as bits."""
+    """Fill the accelerations between two impacts in a row, after that of `hit`; returns the closed contacts that open, as
+    bits."""
     candidates = closed_bits(contacts)
     if candidates & hit and not choose_closed(
         where, state, env, model, contacts, frictions, work, solver, candidates, 0, t, origin
@@ -145,7 +148,7 @@ def rates_between(where, state, env, model, contacts, frictions, work, solver, t
 
 @lean_jit
 def undecide(where, state, contacts, opened):
-    """Close the contacts in `opened` again that are at rest, for it is decided later which of them stay closed."""
+    """Close those contacts in `opened` again that are at rest: which of them stay closed is decided later."""
     for i in range(contacts.shape[0]):
         if opened >> i & 1 and state[State.COORDINATES + where[Where.DOF] + contacts[i, ContactColumn.COORDINATE]] == 0.0:
             contacts[i, ContactColumn.CLOSED] = 1
@@ -153,7 +156,7 @@ def undecide(where, state, contacts, opened):
 
 @lean_jit
 def is_apart(one, other):
-    """Whether two shifts are not of one instant."""
+    """Whether two shifts differ by more than rounding, so that the events are not at one instant in neighbouring motions."""
     return not abs(one - other) <= APART * (abs(one) + abs(other))
 
 
@@ -161,8 +164,8 @@ def is_apart(one, other):
 def impacts_in_a_row(where, state, env, model, contacts, frictions, work, solver, t, origin, hit, backwards):
     """The impacts of contacts that close at one instant, block by block; an `ImpactDetail`, or -1 if one of them fails.
 
-    Their impulses are then in `IMPULSES`, and the shift of the event in `EVENT_SHIFTS`, nan where the blocks' instants differ.
-    The columns are those of the last one, with the accelerations after it.
+    `IMPULSES` then holds the impulses of all, and `EVENT_SHIFTS` the shift of the event, nan for columns along which the blocks'
+    instants differ. The columns are those at the last impact, with the accelerations after it.
     """
     total, opened, shifts = np.zeros(contacts.shape[0]), 0, State.COORDINATES + 2 * where[Where.DOF]
     found, begun, together = int(ImpactDetail.REGULAR), False, solver[Solver.EVENT_SHIFTS]
@@ -191,7 +194,8 @@ def impacts_in_a_row(where, state, env, model, contacts, frictions, work, solver
 
 @lean_jit
 def compare_orders(where, state, work, other):
-    """Set those columns to nan that, taken back to a fixed time, are not those of the other order; returns whether any is."""
+    """Set the shifts of columns to nan that, taken back to a fixed time, differ from those of the other order of impacts; returns
+    whether there is any such column."""
     own, dof, a, differs = where[Where.OWN], where[Where.DOF], work[Work.ACCELERATIONS], False
     for j in range(where[Where.COLUMNS]):
         u, shift, size, apart = State.COORDINATES + own * (1 + j), state[State.COORDINATES + 2 * dof + j], 0.0, 0.0
@@ -207,7 +211,7 @@ def compare_orders(where, state, work, other):
 
 @jit
 def impacts_in_any_order(where, state, env, model, contacts, frictions, work, solver, t, origin, hit):
-    """The same, with columns that are nan where the order of the blocks makes a difference."""
+    """As `impacts_in_a_row`, in both orders; columns are nan where the order of the blocks makes a difference."""
     start, rows = state.copy(), contacts.copy()
     impacts_in_a_row(where, state, env, model, contacts, frictions, work, solver, t, origin, hit, True)
     rates_between(where, state, env, model, contacts, frictions, work, solver, t, origin, hit)
@@ -248,7 +252,7 @@ def contact_impact(where, state, env, model, contacts, frictions, work, solver, 
 
 @jit
 def rests_in_a_row(where, state, env, model, contacts, frictions, work, solver, t, origin, near):
-    """Bring the contacts in `near` to rest, whose impacts die away; those of each block at the instant of its own last impact."""
+    """Bring the contacts in `near`, whose impacts accumulate, to rest: each block at the instant of its own last impact."""
     total, jumped, first = np.zeros(contacts.shape[0]), 0, State.COORDINATES + 2 * where[Where.DOF]
     for i in range(contacts.shape[0]):
         jumped |= 1 << i if near >> i & 1 and solver[Solver.GAPS][i] == 0.0 and solver[Solver.RATES][i] > 0.0 else 0

@@ -1,4 +1,4 @@
-"""Linear complementarity problems of a few contacts, by trying which of them act.
+"""Linear complementarity problems of a few contacts, solved by trying all sets of acting contacts.
 
 Its compiled part goes into one module with that of `contacts_kernel.py`.
 """
@@ -15,7 +15,7 @@ from saltus.taylor import lean_jit
 
 @lean_jit
 def eliminate(block, size, columns):
-    """Solve a linear system: its matrix, then its right-hand sides, lie in the rows of `block`; False if it is singular."""
+    """Solve a linear system in place: the rows of `block` hold its matrix and its right-hand sides; False if it is singular."""
     for k in range(size):
         pivot = k
         for i in range(k + 1, size):
@@ -51,7 +51,7 @@ def invert(numbers, size, block, inverse):
 
 @lean_jit
 def acting(matrix, right, size, bits, block, z):
-    """z of the rows in `bits` such that right + matrix z = 0 there, and 0 elsewhere; False if there is none."""
+    """Find z such that right + matrix z = 0 in the rows in `bits`, with z = 0 in the other rows; False if there is none."""
     count = 0
     for i in range(size):
         z[i] = 0.0
@@ -75,9 +75,10 @@ def acting(matrix, right, size, bits, block, z):
 
 @lean_jit
 def complementary(matrix, right, size, block, tried, z):
-    """z with 0 <= z _|_ right + matrix z >= 0; returns the bits of the rows that act, or -1 if there is none.
+    """Find z with 0 <= z _|_ right + matrix z >= 0; returns the bits of the rows that act (z > 0), or -1 if there is no solution.
 
-    Of all choices of rows the first that violates nothing is taken, or else that which rounding violates least.
+    The first set of acting rows that violates no inequality is taken; if all violate some, the set with the smallest violation,
+    as long as that may be rounding.
     """
     found, least, scale = -1, np.inf, 0.0
     for i in range(size):

@@ -1,4 +1,4 @@
-"""Which of the contacts that are at rest at their positions stay closed.
+"""The decision which of the contacts that are at rest at their positions stay closed.
 
 Its compiled part goes into one module with that of `contacts_kernel.py`, whose docstring defines the arguments.
 """
@@ -18,7 +18,8 @@ from saltus.taylor import lean_jit
 
 @lean_jit
 def holds(where, model, contacts, work, solver, candidates):
-    """Whether the first Taylor coefficients that are not 0 confirm which of the candidates are closed; notes how many are 0."""
+    """Whether the first non-zero Taylor coefficients of the guards confirm the choice of closed contacts among the candidates;
+    notes how many coefficients before them are 0."""
     order, g, own, count = where[Where.ORDER], work[Work.GAP], where[Where.OWN], contacts.shape[0]
     for i in range(count):
         if not candidates >> i & 1:
@@ -39,10 +40,11 @@ def holds(where, model, contacts, work, solver, candidates):
 
 @lean_jit
 def choose_closed(where, state, env, model, contacts, frictions, work, solver, candidates, still, t, origin):
-    """Decide which of the candidates, which are at rest at their positions, stay closed; False if nothing is consistent.
+    """Decide which of the candidates, which are at rest at their positions, stay closed; False if no choice is consistent.
 
-    0 <= reaction _|_ second derivative of the gap >= 0, and where both are 0 the same of their first derivatives that are not.
-    Likewise which of the frictions in `still`, which have the speed of their ground, stick: if they can, they do.
+    The choice fulfils 0 <= reaction _|_ second derivative of the gap >= 0; where both are 0, their first non-zero derivatives
+    decide likewise. It is decided together which of the frictions in `still`, which have the speed of their ground, stick: all
+    that can.
     """
     count = contacts.shape[0]
     for number in range((1 << count) * 3 ** frictions.shape[0]):
@@ -63,9 +65,9 @@ def choose_closed(where, state, env, model, contacts, frictions, work, solver, c
 
 @lean_jit
 def note_ties(where, state, env, model, contacts, work, candidates, t, origin):
-    """Note that the reactions vanish of all candidates of which they do to within rounding, as they do of one that is released.
+    """Note for all candidates whose reaction is 0 within rounding that it is known to be 0, as for a contact that is released.
 
-    Cells of a chain that move alike let go at one instant, of which each has its own rounding.
+    Cells of a chain that move alike release their contacts at one instant, but with different rounding errors.
     """
     for i in range(contacts.shape[0]):
         if candidates >> i & 1:

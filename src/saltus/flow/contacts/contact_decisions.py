@@ -1,4 +1,4 @@
-"""Decisions in the kernel for several contacts: which contacts stay closed and what sticks, and where impacts come to rest.
+"""Decisions in the kernel for several contacts: which contacts stay closed, which frictions stick, and where impacts accumulate.
 
 Its compiled part goes into one module with that of `contacts_kernel.py`, whose docstring defines the arguments.
 """
@@ -48,7 +48,7 @@ from saltus.taylor import lean_jit
 
 @lean_jit
 def free_pulls(where, state, env, model, contacts, work, solver, t, origin):
-    """Fill the second derivatives of the gaps with no contact closed; returns by how much they change, relatively, in time."""
+    """Fill the second derivatives of the gaps with all contacts open; returns 1 plus their largest relative rate of change."""
     own, change = where[Where.OWN], 0.0
     first = env[0].size - own
     for i in range(own):
@@ -63,7 +63,7 @@ def free_pulls(where, state, env, model, contacts, work, solver, t, origin):
 
 @lean_jit
 def end_accumulation_of(where, state, settings, env, model, contacts, frictions, work, solver, events, t, origin):
-    """Bring to rest what impacts that get smaller and smaller bring to rest soon; returns when, or t."""
+    """Bring contacts to rest whose impacts accumulate soon; returns the end of the accumulation, or t if there is none."""
     count, own, tol = contacts.shape[0], where[Where.OWN], settings[Setting.TOLERANCE]
     if not couple(where, state, env, model, contacts, solver):
         return t
@@ -101,7 +101,8 @@ def end_accumulation_of(where, state, settings, env, model, contacts, frictions,
 
 @lean_jit
 def event_shifts(where, state, contacts, events, solver):
-    """Fill `EVENT_SHIFTS` by those of the columns, or of an impact that has just been noted: nan if it is of several instants."""
+    """Fill `EVENT_SHIFTS` with the shifts in the state, or with those recorded for an impact at this instant, which are nan if
+    contacts close at several instants in neighbouring motions."""
     for i in range(contacts.shape[0]):
         if contacts[i, ContactColumn.RELEASED] == 1:
             return  # `release_columns` has filled them
@@ -114,7 +115,7 @@ def event_shifts(where, state, contacts, events, solver):
 
 @lean_jit
 def decide_columns(where, state, env, model, contacts, frictions, work, solver, t, origin):
-    """Take the columns on from an event, or from the start, now that it is known which contacts are closed."""
+    """Take the columns from an event back to a fixed time, or from the start on, once it is known which contacts are closed."""
     if where[Where.COLUMNS] == 0:
         return
     if where[Where.LEAVE_BY] == 1:
@@ -134,7 +135,7 @@ def decide_columns(where, state, env, model, contacts, frictions, work, solver, 
 
 @lean_jit
 def decide_contacts(where, state, settings, env, model, contacts, frictions, work, solver, events, origin):
-    """Find out which contacts are closed from here on. Returns PAUSED to go on, or NOT_UNIQUE."""
+    """Decide which contacts are closed and which frictions stick from here on. Returns PAUSED to go on, or NOT_UNIQUE."""
     t, count = state[State.TIME], contacts.shape[0]
     rested, shifts = where[Where.HELD] == 1, State.COORDINATES + 2 * where[Where.DOF]
     event_shifts(where, state, contacts, events, solver)

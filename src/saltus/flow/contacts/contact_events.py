@@ -13,7 +13,7 @@ from saltus.flow.motion import EVENT_KINDS, EventKind, Impacts, MotionEvents
 
 @dataclass(frozen=True, slots=True)
 class ContactEvent:
-    """One event: its time, at which contacts or frictions, the velocities of all coordinates before and after, all impulses."""
+    """One event: its time, its contacts or frictions, the velocities of all coordinates before and after it, and all impulses."""
 
     time: float
     kind: EventKind

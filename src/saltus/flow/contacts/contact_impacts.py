@@ -21,7 +21,7 @@ from saltus.taylor import lean_jit
 
 @lean_jit
 def hold_coordinates(where, env, contacts):
-    """Tell the model's functions which coordinates are free."""
+    """Tell the model's functions, through `env`, which coordinates are free."""
     first = env[0].size - where[Where.OWN]
     for i in range(where[Where.OWN]):
         env[0][first + i] = 1.0
@@ -32,7 +32,7 @@ def hold_coordinates(where, env, contacts):
 
 @lean_jit
 def closed_bits(contacts):
-    """The contacts that are closed."""
+    """The contacts that are closed, as bits."""
     bits = 0
     for i in range(contacts.shape[0]):
         bits |= contacts[i, ContactColumn.CLOSED] << i
@@ -68,7 +68,7 @@ def contact_step_size(where, settings, env, model, contacts, work, t, origin, ta
 
 @lean_jit
 def restitution(solver, own, count, i, j):
-    """E_ij."""
+    """The entry E_ij of the restitution matrix."""
     return solver[Solver.NUMBERS][own * own + count * i + j]
 
 
@@ -80,7 +80,8 @@ def contact_position(solver, own, count, i):
 
 @lean_jit
 def couple(where, state, env, model, contacts, solver):
-    """Fill the numbers of the contacts at the present state, their coupling, and the gaps with their rates."""
+    """Fill `NUMBERS`, `INVERSE`, `COUPLING`, `GAPS` and `RATES` of `solver` at the present state; False if the mass matrix is
+    singular."""
     own, count, signs = where[Where.OWN], contacts.shape[0], model[ContactPart.SIGNS]
     model[ContactPart.MATRICES](env, where[Where.PIECE], state, solver[Solver.NUMBERS])
     regular = invert(solver[Solver.NUMBERS], own, solver[Solver.BLOCK], solver[Solver.INVERSE])
@@ -96,7 +97,7 @@ def couple(where, state, env, model, contacts, solver):
 
 @lean_jit
 def reduce_to(solver, chosen, count):
-    """Copy the coupling of the contacts in `chosen` to the first rows of the reduced one; returns how many they are."""
+    """Copy the coupling of the contacts in `chosen` to the first rows of `REDUCED`; returns the number of these contacts."""
     row = 0
     for i in range(count):
         if chosen >> i & 1:
@@ -111,10 +112,10 @@ def reduce_to(solver, chosen, count):
 
 @lean_jit
 def impact_impulses(solver, own, count, chosen, rates):
-    """The impulses of the contacts in `chosen`, 0 <= J _|_ v+ + E v- >= 0 with v+ = v- + G J, and those of them that act.
+    """Find the impulses J of the contacts in `chosen`: 0 <= J _|_ v+ + E v- >= 0 with v+ = v- + G J.
 
-    `rates` holds v- of all contacts, and v+ afterwards: of a contact that acts -E v- itself, so that what is 0 is so exactly.
-    Returns the bits of those that act, or -1 if there are no impulses.
+    `rates` holds v- of all contacts, and afterwards v+. For a contact that acts v+ is set to -E v-, so that a rate of 0 is
+    exactly 0. Returns the contacts that act as bits, or -1 if there is no solution.
     """
     size, row, after = reduce_to(solver, chosen, count), 0, solver[Solver.TRIED]
     for i in range(count):
@@ -134,7 +135,7 @@ def impact_impulses(solver, own, count, chosen, rates):
         if chosen >> i & 1:
             acts |= (bits >> row & 1) << i
             row += 1
-    for i in range(count - 1, -1, -1):  # from the reduced order to all contacts, from behind
+    for i in range(count - 1, -1, -1):  # spread them from the chosen to all contacts, the last one first
         if chosen >> i & 1:
             row -= 1
             solver[Solver.IMPULSES][i] = solver[Solver.IMPULSES][row]
@@ -159,7 +160,7 @@ def impact_impulses(solver, own, count, chosen, rates):
 
 @lean_jit
 def push(where, state, model, contacts, solver):
-    """Add what the impulses give to the velocities."""
+    """Add the effect of the impulses to the velocities."""
     first = State.COORDINATES + where[Where.DOF]
     for i in range(where[Where.OWN]):
         for j in range(contacts.shape[0]):
@@ -182,13 +183,13 @@ def record_contact_event(where, state, contacts, events, kind, which, t):
     for k in range(contacts.shape[0]):
         values[i, 1 + 2 * own + k] = 0.0
     for j in range(where[Where.COLUMNS]):
-        values[i, 1 + 2 * own + contacts.shape[0] + j] = math.nan  # unless `note_shifts` knows better
+        values[i, 1 + 2 * own + contacts.shape[0] + j] = math.nan  # until `note_shifts` sets them
     where[Where.EVENTS] = i + 1
 
 
 @lean_jit
 def fill_after(where, state, contacts, solver, events):
-    """Note the velocities and the impulses of the last event."""
+    """Complete the last event by the velocities after it and the impulses."""
     values, own, first = events[1], where[Where.OWN], State.COORDINATES + where[Where.DOF]
     i = where[Where.EVENTS] - 1
     for k in range(own):
@@ -199,7 +200,7 @@ def fill_after(where, state, contacts, solver, events):
 
 @lean_jit
 def settle_contact(where, state, model, contacts, solver, i, rate):
-    """Put a contact that was closed by an impact, or held, at its position with the rate after it."""
+    """Put the coordinate of a contact that takes part in an impact exactly at its position, with the rate after the impact."""
     own, count, coordinate = where[Where.OWN], contacts.shape[0], contacts[i, ContactColumn.COORDINATE]
     state[State.COORDINATES + coordinate] = contact_position(solver, own, count, i)
     state[State.COORDINATES + where[Where.DOF] + coordinate] = model[ContactPart.SIGNS][i] * rate + 0.0
@@ -209,7 +210,8 @@ def settle_contact(where, state, model, contacts, solver, i, rate):
 
 @lean_jit
 def closed_pulls(solver, own, count, near, b, x, u, pull):
-    """The second derivatives of the gaps in `near`, with those closed that are at 0, at rest there and pushed."""
+    """The second derivatives of the gaps in `near`, where contacts at rest at 0 are closed if their reaction pushes; returns the
+    contacts that are at rest, as bits."""
     still, row = 0, 0
     for i in range(count):
         if near >> i & 1 and x[i] == 0.0 and u[i] == 0.0:
@@ -239,9 +241,10 @@ def closed_pulls(solver, own, count, near, b, x, u, pull):
 
 @lean_jit
 def time_to_close(x, u, a):
-    """When x + u t + a t^2 / 2 falls to 0 from above; infinite if it never does.
+    """The time at which x + u t + a t^2 / 2 falls to 0 from above; infinite if it never does.
 
-    A gap of 0 that closes is one that was too small for a number: impacts that let it shrink by its square each time do that.
+    It is 0 for a gap of 0 that is closing: such a gap has become smaller than the least number, by impacts that square it each
+    time.
     """
     if x == 0.0 and u < 0.0:
         return 0.0
@@ -255,10 +258,11 @@ def time_to_close(x, u, a):
 
 @lean_jit
 def frozen_accumulation(solver, own, count, near, limit):
-    """The time in which the contacts in `near` lose all speed if their accelerations stay as they are.
+    """The time in which the contacts in `near` lose all speed by impacts, if the accelerations stay constant.
 
-    Between its impacts each gap then moves on a parabola. No other contact may close meanwhile. Less than 0 if they do not lose
-    it within `limit`: minus the number of impacts that were followed. Which of them stay closed is decided afterwards.
+    Each gap then follows parabolas between its impacts. No other contact may close meanwhile. If they do not lose their speed
+    within `limit`, minus the number of impacts that were followed is returned. Which of the contacts stay closed is decided
+    later.
     """
     time, first, b, pull = 0.0, 0.0, solver[Solver.PULLS], solver[Solver.FALLING_PULLS]
     x, u = solver[Solver.FALLING_GAPS], solver[Solver.FALLING_RATES]
@@ -302,7 +306,7 @@ def frozen_accumulation(solver, own, count, near, limit):
 
 @lean_jit
 def max_rate(u, pull, near, still, count):
-    """The largest speed of the contacts in `near`, and of those that rest the largest pull away from them."""
+    """The largest of the speeds of the contacts in `near` and of the accelerations with which resting ones open."""
     largest = 0.0
     for i in range(count):
         if near >> i & 1:
@@ -314,7 +318,7 @@ def max_rate(u, pull, near, still, count):
 
 @lean_jit
 def near_contacts(solver, count, slow):
-    """The contacts that impacts of at most that speed may reach, as bits; 0 if nothing bounces among them."""
+    """The contacts that may take part in an accumulation with speeds up to `slow`, as bits; 0 if none of them bounces."""
     near, bounces = 0, False
     for i in range(count):
         x, u, b = solver[Solver.GAPS][i], solver[Solver.RATES][i], solver[Solver.PULLS][i]
@@ -326,7 +330,7 @@ def near_contacts(solver, count, slow):
 
 @lean_jit
 def smaller_set(solver, contacts, near):
-    """Of the contacts in `near` those that have just impacted and those that are closed: a set of a smaller scale, or 0."""
+    """The contacts in `near` whose gap is 0, for an accumulation on a smaller scale; 0 if these are all of `near`."""
     smaller = 0
     for i in range(contacts.shape[0]):
         if near >> i & 1 and solver[Solver.GAPS][i] == 0.0:
@@ -336,7 +340,7 @@ def smaller_set(solver, contacts, near):
 
 @lean_jit
 def bring_to_rest(where, state, model, contacts, solver, near):
-    """Take the speeds of the contacts in `near`, by impulses on these alone, and close them."""
+    """Stop the contacts in `near` by impulses on these alone, and close them."""
     count, row = contacts.shape[0], 0
     size = reduce_to(solver, near, count)
     for i in range(count):
@@ -358,13 +362,13 @@ def bring_to_rest(where, state, model, contacts, solver, near):
 
 @lean_jit
 def slow_impacts(tol):
-    """The speed below which an impact may be the end of an accumulation, as with one contact."""
+    """The speed of an impact below which the end of an accumulation may be near, as with one contact (`slow_speed`)."""
     return max(SLOW * math.sqrt(tol), CHATTER_SPEED)
 
 
 @lean_jit
 def is_smooth(where, contacts):
-    """Whether a motion goes on smoothly: nothing is known of its guards but that gaps which have just opened are 0."""
+    """Whether a motion is on a smooth arc, and the only guards known to be 0 are the gaps of contacts that have just opened."""
     smooth = where[Where.MODE] == Mode.ARC
     for i in range(contacts.shape[0]):
         smooth = smooth and contacts[i, ContactColumn.SKIP] <= 1 - contacts[i, ContactColumn.CLOSED]

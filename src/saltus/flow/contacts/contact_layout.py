@@ -1,4 +1,4 @@
-"""What the kernel for several contacts and its callers agree on: places in its arrays, and its thresholds."""
+"""Places in the arrays that the kernel for several contacts shares with its callers, and its thresholds."""
 
 from __future__ import annotations
 
@@ -9,38 +9,38 @@ class ContactColumn(IntEnum):
     """Columns of the array `contacts` of whole numbers, with a row for each contact."""
 
     COORDINATE = 0  # the coordinate that it holds
-    CLOSED = 1  # whether it does: its gap and the gap's rate are then exactly 0
-    SKIP = 2  # of its guard, how many of the first Taylor coefficients are known to be 0 at the start of a step
-    RELEASED = 3  # 1 where its reaction has just reached 0 from above, so that it is known to be 0
-    WAITS = 4  # how many of its impacts are left until it is asked again whether an accumulation ends soon
+    CLOSED = 1  # 1 if it is closed: its gap and the gap's rate are then exactly 0
+    SKIP = 2  # how many of the first Taylor coefficients of its guard are known to be 0 at the start of a step
+    RELEASED = 3  # 1 if its reaction has just fallen to 0, and is known to be 0
+    WAITS = 4  # after how many more of its impacts the end of an accumulation is looked for again
 
 
 class FrictionColumn(IntEnum):
-    """Columns of the rows behind them, one for each friction."""
+    """Columns of the rows behind those of the contacts, one row for each friction."""
 
-    COORDINATE = 0  # along which it acts
-    SLIDES = 1  # in which direction of it, 0 where it sticks
-    SKIP = 2  # of its guard, how many of the first Taylor coefficients are known to be 0 at the start of a step
-    MARGIN = 3  # of which of the two margins of one that sticks
-    REACHED = 4  # 1 or 2: which margin has just reached 0; 3: the sliding speed has
+    COORDINATE = 0  # the coordinate along which it acts
+    SLIDES = 1  # the direction in which it slides, +1 or -1; 0 if it sticks
+    SKIP = 2  # how many of the first Taylor coefficients of its guard are known to be 0 at the start of a step
+    MARGIN = 3  # if it sticks, the number of the margin that SKIP refers to
+    REACHED = 4  # 1 or 2: this margin has just reached 0; 3: the sliding speed has
 
 
 class ContactPart(IntEnum):
-    """Places in the tuple `model`: what the kernel calls for a structure, and the signs of the contacts."""
+    """Places in the tuple `model`: the functions of a structure that the kernel calls, and the signs of the contacts."""
 
     SERIES = 0
     MATRICES = 1
     SIGNS = 2
-    SLOPES = 3  # of what `MATRICES` fills, along each column of the tangent
+    SLOPES = 3  # the derivatives, along each column of the tangent, of the numbers that `MATRICES` fills
     TANGENT = 4
 
 
 class Solver(IntEnum):
     """Places in the tuple `solver` of arrays, in which impacts and closed contacts are solved for."""
 
-    NUMBERS = 0  # mass matrix by rows, E by rows, positions: what `MATRICES` fills
+    NUMBERS = 0  # filled by `MATRICES`: mass matrix by rows, E by rows, positions, speeds of the frictions' grounds
     INVERSE = 1  # of the mass matrix
-    COUPLING = 2  # of the contacts, signs included: the rates that unit impulses give to gaps
+    COUPLING = 2  # the rates that unit impulses of the contacts give to the gaps, signs included
     BLOCK = 3  # the rows of a linear system, with its right-hand sides behind them
     REDUCED = 4  # the coupling of some of the contacts
     RIGHT = 5
@@ -59,60 +59,60 @@ class Solver(IntEnum):
 
 
 class SegmentPlan(IntEnum):
-    """Columns of what is given of the segments of an orbit (`contact_segments.py`)."""
+    """Columns of the plan that describes each segment of an orbit (`contact_segments.py`)."""
 
-    ALONG = 0  # the contacts that are closed along it, as bits
-    KIND = 1  # of the event with which it ends: IMPACT or RELEASE of `EventCode`, -1 for none
-    CONTACT = 2  # of that event
-    AFTER = 3  # the contacts that are closed after it
-    POWER = 4  # of its duration by which its guard is divided: with which the gap of the contact grows that it begins and ends at
-    HIT = 5  # the contact at whose impact it begins, -1 for none
+    ALONG = 0  # the contacts that are closed along the segment, as bits
+    KIND = 1  # the kind of the event with which it ends: IMPACT or RELEASE of `EventCode`, -1 for none
+    CONTACT = 2  # the contact of that event
+    AFTER = 3  # the contacts that are closed after it, as bits
+    POWER = 4  # its guard is divided by this power of its duration: 3 or 2 for excursions (`excursion_guard`), else 0
+    HIT = 5  # the contact whose impact begins it, -1 for none
 
 
 class SegmentEnd(IntEnum):
-    """Places in the numbers of a segment's ends."""
+    """Places in the numbers that describe a segment's ends."""
 
-    GUARD = 0  # of its event: the gap, or the reaction
-    RATE = 1  # of the guard, by which the speed of an impact is read
-    BY_START = 2  # the guard's derivative to the time of the segment's start, and to that of its end
-    BY_END = 3
+    GUARD = 0  # the guard of its event: the gap, or the reaction
+    RATE = 1  # the guard's rate; at an impact minus the speed
+    BY_START = 2  # the guard's derivative to the time of the segment's start
+    BY_END = 3  # the guard's derivative to the time of its end
     NUMBERS = 4  # state and rates at the start, both at the end, the state after the event: 10 numbers for each coordinate
 
 
 class SegmentExtremes(IntEnum):
-    """Places in what is seen along a segment."""
+    """Places in the extremes along a segment; inf where there is no such minimum."""
 
     TOP = 0  # the largest value of any coordinate
-    BOTTOM = 1
-    GAP = 2  # the lowest inner minimum of a gap, when, and whose
-    FORCE = 5  # the same of a reaction
-    PULL = 8  # the least reaction or acceleration from a contact with which it begins, and whose
-    TAIL = 10  # the least reaction with which it ends, and whose: of contacts that stay closed up to the event
-    BESIDE = 12  # the least gap, at the impact with which it ends, of another contact whose speed the impact changes
-    MARGINS = 13  # their least values, from here on
+    BOTTOM = 1  # the least value of any coordinate
+    GAP = 2  # the lowest inner minimum of a gap, its time, and its contact
+    FORCE = 5  # the lowest inner minimum of a reaction, its time, and its contact
+    PULL = 8  # at the start, the least reaction of a closed contact or acceleration of an opening one, and its contact
+    TAIL = 10  # at the end, the least reaction of a contact that stays closed up to the event, and its contact
+    BESIDE = 12  # at an impact that ends it, the least gap of another contact whose speed the impact changes
+    MARGINS = 13  # the least values of the margins, from here on
 
 
 class ImpactDetail(IntEnum):
-    """What an impact leaves of the tangent."""
+    """Whether the motion has derivatives after an impact, or why it has none."""
 
     REGULAR = 0
-    NO_SPEED = 1  # a contact is reached without speed, so that motions beside this one have no derivative
-    APART = 2  # contacts close at one instant, and motions beside this one close them one after the other
-    ORDERED = 3  # the same of contacts that do not act on one another, and their order makes a difference of first order
+    NO_SPEED = 1  # a contact is reached without speed
+    APART = 2  # contacts that act on one another close at one instant, and in neighbouring motions one after the other
+    ORDERED = 3  # contacts that do not act on one another close at one instant, and their order makes a first-order difference
 
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
 NEAR = (
     2.0**-44
-)  # Contacts close together if when one does the other's gap is no larger than this share of what it was in the step.
-GAP_ROUNDING = 2.0**-6  # of a gap, in NEAR times the contact's position
-VIOLATED = 1e-12  # The largest share of its right-hand side by which a complementarity problem may be violated by rounding.
-MOST_FROZEN_IMPACTS = 100_000  # that an accumulation is followed for: e = 0.9996 needs so many for 16 digits
-APART = 1e-9  # Contacts close together in motions beside one if the derivatives of their instants differ by less than this share.
-RELATIVE_STEP = 1e-4  # of differences of an accumulation's duration: their error is its square, and 1e-12 by rounding
+)  # Contacts close together if, when one closes, the other's gap is no larger than this share of its size in the step.
+GAP_ROUNDING = 2.0**-6  # The rounding of a gap, in units of NEAR times the contact's position.
+VIOLATED = 1e-12  # The largest violation of a complementarity problem that may be rounding, as a share of its right-hand side.
+MOST_FROZEN_IMPACTS = 100_000  # Impacts of an accumulation that are followed at most: e = 0.9996 needs so many for 16 digits.
+APART = 1e-9  # Contacts close together in neighbouring motions too if their shifts differ by less than this share.
+RELATIVE_STEP = 1e-4  # of the differences of an accumulation's duration: their error is its square, and 1e-12 by rounding
 VANISHED = 1e-16  # A contact whose impacts are slower than the first one of an accumulation by this factor rests.
-FINISHED = 1e-14  # All that is slower than that by this factor is over: accumulations of one contact within those of another
-# are cut off at VANISHED, and near that scale the cuts would keep the other one going.
-TRIED_AGAIN = 32  # Of the impacts that were followed ahead in vain, one in so many has to come before they are followed again.
-TIED = 1e-12  # A smaller reaction vanishes together with that of another contact: rounding of the loads that hold them.
+FINISHED = 1e-14  # An accumulation is over if all speeds are smaller than the first one by this factor. It exceeds VANISHED, at
+# which accumulations of one contact within those of another are cut off: near that scale the cuts would keep the other one going.
+TRIED_AGAIN = 32  # If n impacts were followed ahead in vain, n / 32 impacts must happen before it is tried again.
+TIED = 1e-12  # Reactions smaller than this vanish together: the rounding of the loads that hold the contacts.

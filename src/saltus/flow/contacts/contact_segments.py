@@ -1,8 +1,8 @@
-"""Smooth segments of motions with several contacts, from event to event, with their derivatives: what their orbits are made of.
+"""Smooth segments of motions with several contacts, from event to event, with their derivatives: the parts of periodic orbits.
 
-The events and the contacts that are closed between them are given, and so are their times: the motion is followed whatever the
-signs of the gaps and the reactions are, which the orbit's equations bring to 0 (see `orbits/contact_problem.py`). So a family of
-orbits goes smoothly through the point at which one of its events disappears.
+The events, their times and the contacts that are closed between them are given. The motion is followed whatever the signs of the
+gaps and the reactions; the orbit's equations make each event's guard 0 (see `orbits/contact_problem.py`). A family of orbits
+therefore goes smoothly through the point at which one of its events disappears.
 
 Its compiled part goes into one module with those of the files that it imports from.
 """
@@ -41,12 +41,12 @@ from saltus.taylor import by_reference, cached_jit, jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
-MOST_STEPS = 10_000  # of one segment: more are taken only beside a singular mass matrix, in steps that shrink to nothing
+MOST_STEPS = 10_000  # of one segment: only near a singular mass matrix do steps become so short that more would be needed
 
 
 @lean_jit
 def unit_columns(where, state):
-    """The columns of the present state itself: unit ones, and 0 to the parameters."""
+    """Set the columns to the derivatives of the present state to itself, the unit matrix, and to the parameters, 0."""
     own, dof = where[Where.OWN], where[Where.DOF]
     for j in range(where[Where.COLUMNS]):
         for i in range(own):
@@ -56,7 +56,7 @@ def unit_columns(where, state):
 
 @lean_jit
 def hold_contacts(where, state, env, model, contacts, solver, closed):
-    """Close the contacts in `closed` and no others: their coordinates, and those of the columns, are where they are held."""
+    """Close the contacts in `closed` and no others: their coordinates are put at the contacts' positions, also in the columns."""
     own, count = where[Where.OWN], contacts.shape[0]
     fill_slopes(where, state, env, model, solver)
     for i in range(count):
@@ -70,7 +70,7 @@ def hold_contacts(where, state, env, model, contacts, solver, closed):
 
 @lean_jit
 def follow_segment(where, state, settings, env, model, contacts, work, solver, begin, end, roots, seen, least):
-    """Follow one segment with the contacts that are closed; returns in how many steps, or 0 where that cannot be done."""
+    """Follow one segment with the given contacts closed; returns the number of steps, or 0 if it cannot be followed."""
     order, t, forwards = where[Where.ORDER], begin, end >= begin
     for count in range(MOST_STEPS):
         size = expand(where, state, env, model, work, t, 0.0, 1.0, order)
@@ -90,7 +90,8 @@ def follow_segment(where, state, settings, env, model, contacts, work, solver, b
 
 @lean_jit
 def stays_closed(solver, count, acts, after):
-    """Whether no contact in `after` is opened by an impact, as one is that has no impulse itself when those in `acts` have."""
+    """Whether an impact opens none of the contacts in `after`: it opens a contact without an impulse that is coupled to the
+    contacts in `acts`, which have one."""
     for i in range(count):
         if after >> i & 1 and not acts >> i & 1:
             for k in range(count):
@@ -101,9 +102,11 @@ def stays_closed(solver, count, acts, after):
 
 @lean_jit
 def given_impact(where, state, env, model, contacts, solver, hit, after):
-    """The impact of the contact `hit` whatever the sign of its speed: with the impulses that one of a unit speed has.
+    """Apply the impact of the contact `hit` whatever the sign of its speed; the contacts that act are those of an impact of unit
+    speed.
 
-    Returns False where it has no outcome, or opens one of the contacts in `after`, which are to be closed then.
+    Returns False if the impact law has no solution, or if the impact opens one of the contacts in `after`, which are to be
+    closed.
     """
     own, count, unit = where[Where.OWN], contacts.shape[0], solver[Solver.FALLING_RATES]
     couple(where, state, env, model, contacts, solver)
@@ -158,7 +161,8 @@ def copy_columns(where, state, columns):
 
 @lean_jit
 def start_slope(where, ends, slopes):
-    """The derivative of a guard to the time of the segment's start, from a state that stays: minus that along the motion."""
+    """The derivative of a guard to the time of the segment's start, for a fixed state there: minus the derivative along the
+    motion."""
     total = 0.0
     for j in range(2 * where[Where.OWN]):
         total -= slopes[j] * ends[SegmentEnd.NUMBERS + 2 * where[Where.OWN] + j]
@@ -167,11 +171,11 @@ def start_slope(where, ends, slopes):
 
 @lean_jit
 def excursion_guard(where, model, contacts, work, contact, power, h, ends, slopes):
-    """The gap at the end of an excursion, in one step, divided by a power p of its duration h, and its derivatives.
+    """The gap at the end of an excursion of one step, divided by a power p of its duration h, and its derivatives.
 
-    A contact that is released where its reaction is 0 opens with h^3, one that opens from rest after an impact with h^2: without
-    the terms before, the quotient and its derivatives are regular for any h, also where the excursion appears. With the gap's
-    coefficients c_k, its derivatives w_k to the time of the start at a fixed end, and Q = sum c_k h^(k-p):
+    A contact that is released where its reaction is 0 opens with h^3, and one that opens from rest after an impact with h^2. The
+    series without its first p terms, which are 0, gives a quotient that is regular for all h, also at h = 0, where the excursion
+    appears. With the gap's coefficients c_k, their derivatives w_k to the time of the start, and Q = sum c_k h^(k-p):
 
         dQ/dh = sum (k-p) c_k h^(k-p-1),    dQ/dt_start = sum (w_k + (k+1) c_(k+1)) h^(k-p) - dQ/dh.
     """
@@ -191,7 +195,7 @@ def excursion_guard(where, model, contacts, work, contact, power, h, ends, slope
 
 @lean_jit
 def divide_guard(where, power, h, ends, slopes):
-    """The same of an excursion of several steps."""
+    """Divide the guard of an excursion of several steps, and its derivatives, as `excursion_guard` does for one step."""
     divisor = h**power
     ends[SegmentEnd.GUARD] /= divisor
     turned = power * ends[SegmentEnd.GUARD] / h
@@ -203,7 +207,7 @@ def divide_guard(where, power, h, ends, slopes):
 
 @lean_jit
 def guard_at_end(where, state, env, model, contacts, work, solver, t, kind, contact, ends, slopes):
-    """The guard of a segment's event, its rate and the speed, and the guard's derivatives along the columns."""
+    """The guard of a segment's event, its rate, and its derivatives along the columns."""
     own, count = where[Where.OWN], contacts.shape[0]
     fill_slopes(where, state, env, model, solver)
     if kind == EventCode.RELEASE:
@@ -223,7 +227,8 @@ def guard_at_end(where, state, env, model, contacts, work, solver, t, kind, cont
 
 @lean_jit
 def pass_event(where, state, env, model, contacts, solver, row, ends, maps):
-    """Take the state through the event of a row of the plan, with the derivatives of that; returns whether it has an outcome."""
+    """Take the state through the event of a row of the plan, with the derivatives of its map; False if the event is
+    impossible."""
     own, dof = where[Where.OWN], where[Where.DOF]
     unit_columns(where, state)
     impact = row[SegmentPlan.KIND] == EventCode.IMPACT
@@ -293,13 +298,12 @@ def follow_with(
 
 @cached_jit(CONTACT_SEGMENTS)
 def follow_contact_segments(where, settings, env, model, contacts, plan, times, first, ends, columns, maps, extremes):
-    """Follow segments one after the other, each from the state that the event before it leaves; returns how many succeed.
+    """Follow segments one after the other, each from the state after the event before it; returns how many were followed.
 
-    `plan` says for each which contacts are closed along it, with which event it ends at which contact, and which contacts are
-    closed afterwards (`SegmentPlan`); `times` (n + 1) are those of its ends, `first` is the state at the first one. `ends` holds
-    numbers in the places of `SegmentEnd`; `columns` the derivatives to the state at the start and to the parameters of the state
-    at the end, at a fixed time, and of the guard; `maps` those of the state after the event to the state before it and to the
-    parameters. `extremes` is filled, in the places of `SegmentExtremes`, if it has rows.
+    `plan` describes each segment (`SegmentPlan`), `times` (n + 1) are the times of the segments' ends, and `first` is the state
+    at the first of them. Filled are `ends`, in the places of `SegmentEnd`; `columns`, the derivatives of the state at the end, at
+    a fixed time, and of the guard, to the state at the start and to the parameters; `maps`, the derivatives of the state after
+    the event to the state before it and to the parameters; and, if it has rows, `extremes`, in the places of `SegmentExtremes`.
     """
     solver = solver_arrays(where[Where.OWN], contacts.shape[0], where[Where.COLUMNS], 0)
     arrays = work_arrays(where)

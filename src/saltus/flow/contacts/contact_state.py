@@ -1,4 +1,4 @@
-"""The state of the kernel for several contacts: that of one motion, and what is known of each contact."""
+"""The state of the kernel for several contacts: the state of one motion, and a row of facts about each contact and friction."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ class ContactState(KernelState):
 
     @classmethod
     def at_start(cls, request: MotionRequest, run: Program) -> ContactState:
-        """The state in which a motion starts: contacts that are at rest at their positions are decided on first.
+        """The state in which a motion starts. The kernel first decides which contacts at rest at their positions stay closed.
 
         Raises
         ------
         ParameterError
-            A state beyond a contact, or one that moves into a contact.
+            The state lies beyond a contact, or moves into a contact that it is at.
         """
         start = super().at_start(request, run)
         names, position, speeds = request.system.model.coordinates, request.position, request.speeds
@@ -55,10 +55,10 @@ class ContactState(KernelState):
         return cls(start.where, start.state, start.settings, contacts)
 
     def advance(self, run: Program, steps: Any, events: Any) -> int:
-        """Call the kernel; returns why it comes back."""
+        """Call the kernel; returns the `Status` with which it stops."""
         return load_contacts_kernel()(self.where, self.state, self.settings, run.env, run.model, self.contacts, steps, events)
 
     @property
     def side(self) -> int:
-        """1 and what `modes_of` reads: the contacts that are closed, and what the frictions do."""
+        """1 plus the bits that `modes_of` reads: the closed contacts, and the directions in which frictions slide."""
         return int(self.where[Where.SIDE])

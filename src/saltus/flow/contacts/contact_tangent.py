@@ -1,9 +1,10 @@
-"""What the events of several contacts make of the tangent's columns (see `taylor/derivatives.py`).
+"""The saltation of the tangent's columns at the events of several contacts (see `taylor/derivatives.py`).
 
-At an event at time t(c) the columns are first taken along with it, to the derivatives of the state *at the event*, u + v dt and
-z + a dt with the acceleration a before it. There the event's own map is differentiated, with the contacts that act. Once it is
-known which contacts are closed afterwards the columns are taken back to a fixed time, with the velocity and acceleration that
-the motion then has. Nothing jumps at a simple release, so that its saltation is the identity.
+An event's instant depends on the parameter c of a column. The columns (u, z) of coordinates and velocities are first taken to the
+derivatives of the state *at the event*, u + v dt and z + a dt, where dt is the shift of the event and a the acceleration before
+it. The event's map is differentiated there, with the contacts that act. Once it is known which contacts are closed afterwards,
+the columns are taken back to a fixed time with the velocity and acceleration after the event. Nothing jumps at a simple release,
+so that its saltation is the identity.
 
 Its compiled part goes into one module with that of `contacts_kernel.py`, whose docstring defines `contacts`, `model`, `solver`.
 """
@@ -28,7 +29,7 @@ from saltus.taylor import jit, lean_jit
 
 @lean_jit
 def move_columns(where, state, work, sign):
-    """Take the columns to the event that moves (sign +1), or back from it to a fixed time (-1): u + v dt, z + a dt."""
+    """Take the columns to the event, whose instant moves (sign +1), or back from it to a fixed time (-1): u + v dt, z + a dt."""
     own, dof, a = where[Where.OWN], where[Where.DOF], work[Work.ACCELERATIONS]
     for j in range(where[Where.COLUMNS]):
         shift = sign * state[State.COORDINATES + 2 * dof + j]
@@ -41,7 +42,7 @@ def move_columns(where, state, work, sign):
 
 @lean_jit
 def clear_shifts(where, state):
-    """The event is over."""
+    """Set the shifts of the event to 0, after the columns have been taken back from it."""
     for j in range(where[Where.COLUMNS]):
         state[State.COORDINATES + 2 * where[Where.DOF] + j] = 0.0
 
@@ -54,7 +55,7 @@ def fill_slopes(where, state, env, model, solver):
 
 @lean_jit
 def slope(solver, own, count, j, place):
-    """The derivative of one of the numbers of the contacts along column j."""
+    """The derivative of one of the entries of `NUMBERS` along column j."""
     return solver[Solver.SLOPES][j * solver[Solver.NUMBERS].size + place]
 
 
@@ -75,7 +76,8 @@ def lift_rate(where, state, model, contacts, j, i):
 
 @lean_jit
 def hold_columns(where, state, contacts, solver, chosen):
-    """The columns of a coordinate at a contact in `chosen`: it is where the contact is, and, if it stays closed, at rest."""
+    """Set the columns of coordinates at the contacts in `chosen`: they move with the contact's position and, if it is closed,
+    have no velocity."""
     own, count, dof = where[Where.OWN], contacts.shape[0], where[Where.DOF]
     for j in range(where[Where.COLUMNS]):
         for i in range(count):
@@ -88,7 +90,7 @@ def hold_columns(where, state, contacts, solver, chosen):
 
 @lean_jit
 def release_shifts(where, state, env, model, work, t, origin, i):
-    """By how much the instant moves at which a reaction reaches 0, of which the series is known."""
+    """The shifts of the instant at which a reaction reaches 0, from the reaction's series."""
     model[ContactPart.TANGENT](EventCode.RELEASE, i, t, origin, 1.0, env, where[Where.PIECE], state)
     for j in range(where[Where.COLUMNS]):
         state[State.COORDINATES + 2 * where[Where.DOF] + j] /= -work[Work.MARGINS][i, 1]
@@ -98,7 +100,7 @@ def release_shifts(where, state, env, model, work, t, origin, i):
 def release_columns(where, state, env, model, contacts, work, solver, t, origin, released):
     """Take the columns to the instant at which a reaction reaches 0.
 
-    `EVENT_SHIFTS` are by how much it moves, nan where another reaction that reaches 0 at that instant moves otherwise.
+    `EVENT_SHIFTS` are the shifts of this instant, nan where another reaction reaches 0 at the same instant with another shift.
     """
     first, shifts = State.COORDINATES + 2 * where[Where.DOF], solver[Solver.EVENT_SHIFTS]
     expand(where, state, env, model, work, t, origin, 1.0, 1)
@@ -139,9 +141,9 @@ def closing_columns(where, state, env, model, contacts, work, solver, t, origin,
 
 @jit
 def impulse_columns(where, state, env, model, contacts, solver, acts, chosen):
-    """Differentiate an impact at which the contacts in `acts` have impulses, and those in `chosen` count in its law.
+    """Differentiate an impact at which the contacts in `acts` have impulses and those in `chosen` enter its law.
 
-    M w = S J with the jump w of the velocities, and rates after the impact of -E v-, or of 0 where `chosen` is empty:
+    M w = S J with the jump w of the velocities; the rates of the acting gaps after it are -E v-, or 0 if `chosen` is empty:
 
         M dw + dM w = S dJ,    (dw)_i = -dv_i - sum_j (E_ij dv_j + dE_ij v_j)  of the acting contacts, along their signs.
 
@@ -172,7 +174,8 @@ def impulse_columns(where, state, env, model, contacts, solver, acts, chosen):
 
 @lean_jit
 def note_velocities(where, state, solver, before):
-    """The velocities plus `before` times what was noted, into `JUMP`: those before an impact, then their jump."""
+    """Put the velocities plus `before` times the present `JUMP` into `JUMP`: with 0 the velocities before an impact, then, with
+    -1, their jump."""
     for a in range(where[Where.OWN]):
         velocity = state[State.COORDINATES + where[Where.DOF] + a]
         solver[Solver.JUMP][a] = velocity if before == 0.0 else velocity + before * solver[Solver.JUMP][a]
@@ -180,16 +183,16 @@ def note_velocities(where, state, solver, before):
 
 @lean_jit
 def note_shifts(where, state, contacts, events, shifts, first):
-    """Note with the last event by how much it moves with each column: `shifts` from `first` on."""
+    """Record with the last event its shift along each column, which are the numbers of `shifts` from `first` on."""
     for j in range(where[Where.COLUMNS]):
         events[1][where[Where.EVENTS] - 1, 1 + 2 * where[Where.OWN] + contacts.shape[0] + j] = shifts[first + j]
 
 
 @lean_jit
 def pull_slopes(where, state, env, model, contacts, work, solver, t, origin):
-    """The derivatives at an event of the second derivatives of the gaps with no contact closed, into `PULL_SLOPES`.
+    """Fill `PULL_SLOPES`, the derivatives of the gaps' second derivatives with all contacts open, at an event.
 
-    The coordinates are to be free, and the columns those of the event.
+    All coordinates must be free, and the columns must have been taken to the event.
     """
     own, a, first = where[Where.OWN], work[Work.ACCELERATIONS], State.COORDINATES + 2 * where[Where.DOF]
     expand(where, state, env, model, work, t, origin, 1.0, 0)
@@ -205,7 +208,8 @@ def pull_slopes(where, state, env, model, contacts, work, solver, t, origin):
 
 @lean_jit
 def perturb(where, state, model, contacts, solver, j, step):
-    """Move all that the duration of an accumulation depends on by a step along column j; its sizes that are 0 stay so."""
+    """Move all quantities on which the duration of an accumulation depends by a step along column j; gaps and rates that are 0
+    stay 0."""
     own, count, signs = where[Where.OWN], contacts.shape[0], model[ContactPart.SIGNS]
     numbers = solver[Solver.NUMBERS]
     for i in range(count):
@@ -225,8 +229,8 @@ def perturb(where, state, model, contacts, solver, j, step):
 
 @jit
 def accumulation_shifts(where, state, env, model, contacts, work, solver, near, t, origin):
-    """By how much the end of an accumulation moves with each column, into `EVENT_SHIFTS`, where that of its last impact is: with
-    the difference of what is then left with its gaps, rates, accelerations and numbers moved to both sides."""
+    """Add to `EVENT_SHIFTS`, which hold the shifts of the last impact, those of the time left until the accumulation ends:
+    central differences of this time over the gaps, rates, accelerations and numbers."""
     own, count = where[Where.OWN], contacts.shape[0]
     fill_slopes(where, state, env, model, solver)
     pull_slopes(where, state, env, model, contacts, work, solver, t, origin)
@@ -258,7 +262,7 @@ def accumulation_shifts(where, state, env, model, contacts, work, solver, near, 
 
 @lean_jit
 def rest_columns(where, state, env, model, contacts, solver, near):
-    """The columns as an accumulation of the contacts in `near` ends: they lose their speeds by impulses on them alone."""
+    """The columns at the end of an accumulation, where impulses on the contacts in `near` alone take their speeds."""
     own = where[Where.OWN]
     for a in range(own):
         solver[Solver.JUMP][a] = 0.0
@@ -271,7 +275,8 @@ def rest_columns(where, state, env, model, contacts, solver, near):
 
 @lean_jit
 def project(where, state, model, contacts, solver, closed, first, right):
-    """Add to the `own` numbers of the state from `first` on M^-1 S z, such that the gaps in `closed` lose `right`, in `right`."""
+    """Add M^-1 S z to the `own` numbers of the state from `first` on, with the z for which the gaps in `closed` change by
+    -`right`."""
     own, count, signs = where[Where.OWN], contacts.shape[0], model[ContactPart.SIGNS]
     acting(solver[Solver.COUPLING], right, count, closed, solver[Solver.BLOCK], solver[Solver.TRIED])
     for a in range(own):
@@ -282,7 +287,7 @@ def project(where, state, model, contacts, solver, closed, first, right):
 
 @jit
 def fall_back(where, state, env, model, contacts, work, solver, t, origin, closed, j):
-    """Column j of a start at closed contacts, see `start_columns`."""
+    """Column j for a start at closed contacts, see `start_columns`."""
     own, count, dof, right = where[Where.OWN], contacts.shape[0], where[Where.DOF], solver[Solver.RIGHT]
     u = State.COORDINATES + own * (1 + j)
     z, given = u + dof, state[u : u + own].copy()
@@ -292,7 +297,7 @@ def fall_back(where, state, env, model, contacts, work, solver, t, origin, close
     project(where, state, model, contacts, solver, closed, u, right)
     after, lost = state[u : u + own].copy(), np.zeros(own)
     fallen = given - after  # K h
-    for sign in (0.5, -0.5):  # the parts of a_v K h and M' K h that change with the sign: without those of parameters
+    for sign in (0.5, -0.5):  # the odd parts of a_v K h and M' K h, without the effect of parameters
         for a in range(own):
             state[u + a], state[z + a] = 0.0, math.copysign(1.0, sign) * fallen[a]
         expand(where, state, env, model, work, t, origin, 1.0, 0)
@@ -314,14 +319,14 @@ def fall_back(where, state, env, model, contacts, work, solver, t, origin, close
 
 @lean_jit
 def start_columns(where, state, env, model, contacts, work, solver, t, origin, closed):
-    """The columns of a motion that starts with contacts closed, to the side on which their gaps open.
+    """The one-sided derivatives of a motion that starts with contacts closed, to the side on which their gaps open.
 
-    A gap h falls back, and bounces, within a time of the order of sqrt(h). Whatever the impulses are, the velocities
-    y = (1 - K S') v with K = M^-1 S (S' M^-1 S)^-1 of those contacts do not see them, so that to the first order in h
+    A small gap h closes, and its bounces end, within a time of the order of sqrt(h). The impulses of these contacts do not change
+    the velocities y = (1 - K S') v with K = M^-1 S (S' M^-1 S)^-1, so that to first order in h
 
         u+ = u - K h,    z+ = (1 - K S') (z - a_v K h) + K' h,
 
-    where K' is the rate of K. Where impacts lose nothing motions never come to rest, and there is no derivative.
+    where K' is the time derivative of K. Where impacts lose nothing the bounces never end, and there is no derivative.
     """
     own, count, dof = where[Where.OWN], contacts.shape[0], where[Where.DOF]
     fill_slopes(where, state, env, model, solver)

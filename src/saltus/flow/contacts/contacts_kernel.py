@@ -2,14 +2,14 @@
 
 The compiled parts of `kernel_layout.py`, `roots.py`, `steps.py`, `contact_layout.py`, `complementarity.py`,
 `contact_impacts.py` and this file are compiled as one, once for every model. `where`, `state`, `settings`, `env`, `steps` and
-`events` are as in `kernel.py`; the last numbers in the parameters of `env` say of each coordinate whether it is free (1) or held
+`events` are as in `kernel.py`; the last numbers in the parameters of `env` say for each coordinate whether it is free (1) or held
 (0). `contacts` has a row for each contact in the columns of `ContactColumn`, `model` holds the functions of the structure in the
 places of `ContactPart`, and `solver` the arrays of `Solver`.
 
 In a smooth step the closed contacts hold their coordinates, and the model's series are those of the constrained motion. Each
-contact has a guard: the gap of an open one, the reaction of a closed one. Where a gap reaches 0 the impact law acts; where a
-reaction does, or anything has changed, it is decided anew which of the contacts that are at rest at 0 stay closed. Frictions have
-rows behind those of the contacts (`frictions.py`) and are decided on together with them.
+contact has a guard: the gap if it is open, the reaction if it is closed. If a gap reaches 0, the impact law acts. After this, and
+if a reaction reaches 0 or the load jumps, it is decided again which of the contacts that are at rest at their positions stay
+closed. Frictions have rows behind those of the contacts (`frictions.py`), and it is decided together which of them stick.
 """
 
 from __future__ import annotations
@@ -53,16 +53,17 @@ from saltus.taylor import by_reference, cached_jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
-# A step to the next impact on the same contact.
-FAST_IMPACT = 0.3  # After a faster impact the series that is usual is needed to reach the next one.
-RADIUS = 0.5  # A series of order n is taken to reach as far as this times the n-th root of the tolerance.
-LEAST_ORDER = 6  # Of fewer coefficients the last ones may all vanish by symmetry.
-WORTH = 0.8  # The share of the usual order below which a lower one is tried.
+# Series of a lower order than usual, for a step to the next impact on the same contact.
+FAST_IMPACT = 0.3  # After a faster impact the usual order is needed to reach the next one.
+RADIUS = 0.5  # A series of order n is assumed to be exact up to this times the n-th root of the tolerance.
+LEAST_ORDER = 6  # At lower orders the last coefficients may all vanish by symmetry.
+WORTH = 0.8  # A lower order is tried only below this share of the usual one.
 
 
 @lean_jit
 def first_guard(where, model, contacts, work, solver, h, whole):
-    """The contact whose guard reaches 0 first within the step, when, and whether a touch at the step's end makes it too long."""
+    """The contact whose guard reaches 0 first within the step, the instant, and whether the step is too long to decide on a touch
+    near its end."""
     order, own, count = where[Where.ORDER], where[Where.OWN], contacts.shape[0]
     hit, first, shorter = -1, NEVER, False
     for i in range(count):
@@ -98,9 +99,10 @@ def together(where, model, contacts, work, solver, hit, tau):
 
 @lean_jit
 def short_order(where, state, settings, env, model, contacts, work, t, origin):
-    """The order of series that reach the next impact of a contact that has just impacted: a lower one than usual if that does.
+    """The order of the series for a step to the next impact of a contact that has just impacted: lower than usual if that
+    suffices.
 
-    Until then its gap is about a parabola, of which the duration is known. Most impacts that die away are that near to the next.
+    Until its next impact the gap is nearly a parabola, whose duration is known. Most impacts of accumulations are so close.
     """
     order, first, flight = where[Where.ORDER], State.COORDINATES + where[Where.DOF], np.inf
     for i in range(contacts.shape[0]):
@@ -121,8 +123,9 @@ def short_order(where, state, settings, env, model, contacts, work, t, origin):
 def seek_event(where, state, settings, env, model, contacts, frictions, work, solver, t, origin, target):
     """Expand the motion, and find the first zero of a guard or of a margin within a step.
 
-    Returns the length of the step, and how long it might be by the series; the contact, the friction and the margin whose zero
-    is the first, or -1; which of the friction's guards it is; and the share of the step at which it happens.
+    Returns the length of the step, and the length that the series allow; the contact, the friction and the margin, of which the
+    one with the first zero is given and the others are -1; which of the friction's guards it is; and the share of the step of the
+    zero.
     """
     order, count, margins = where[Where.ORDER], contacts.shape[0], where[Where.MARGINS]
     size = expand(where, state, env, model, work, t, origin, 1.0, order)
@@ -209,7 +212,7 @@ def contact_arc(where, state, settings, env, model, contacts, frictions, work, s
 
 @lean_jit
 def advance_contacts_with(where, state, settings, env_of, model_of, contacts, frictions, arrays, solver_of, steps, events):
-    """The same with the arrays of `Work` and of `Solver`."""
+    """`advance_contacts` with the arrays of `Work` and of `Solver`."""
     env, model, work, solver = by_reference(env_of), by_reference(model_of), by_reference(arrays), by_reference(solver_of)
     couple(where, state, env, model, contacts, solver)
     hold_coordinates(where, env, contacts)
@@ -248,7 +251,7 @@ def advance_contacts_with(where, state, settings, env_of, model_of, contacts, fr
 def advance_contacts(where, state, settings, env, model, rows, steps, events):
     """Advance a motion until it ends, a buffer is full, or a batch of steps is done; returns the reason.
 
-    `rows` are those of the contacts, then those of the frictions.
+    `rows` has the rows of the contacts, then those of the frictions.
     """
     count = model[ContactPart.SIGNS].size
     contacts, frictions = rows[:count], rows[count:]

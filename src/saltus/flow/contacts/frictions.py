@@ -1,8 +1,10 @@
-"""Dry friction in the kernel for several contacts: what sticks is held as a closed contact is, with a bound on both sides.
+"""Dry friction in the kernel for several contacts: a sticking coordinate is held like one at a closed contact, but its friction
+force is bounded on both sides.
 
-`contacts` of the kernel has a row for each friction behind those of the contacts, in the columns of `FrictionColumn`; `frictions`
-are these rows. A friction that slides has the rate q' - w along its direction as its guard, one that sticks its two margins
-(`stick_margins`). The directions stand in the parameters of `env`, before the numbers that say which coordinates are free.
+The kernel's array of contacts has a row for each friction behind those of the contacts, in the columns of `FrictionColumn`;
+`frictions` are these rows. The guard of a friction that slides is the speed q' - w in its direction; a friction that sticks has
+two guards, its margins (`stick_margins`). The directions are kept in the parameters of `env`, before the numbers that say which
+coordinates are free.
 
 Its compiled part goes into one module with that of `contacts_kernel.py`, whose docstring defines the arguments.
 """
@@ -21,14 +23,15 @@ from saltus.taylor import lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
-# Where mu_s = mu_k the acceleration with which sliding begins is 0, and smaller than this by rounding. So is what friction could
-# bear beyond its force where the speed of the ground is reached just as it can: both have to be told by what follows.
+# If mu_s = mu_k, the acceleration with which sliding begins is 0, that is, by rounding, smaller than this. So is a margin of a
+# friction that can only just stick when its speed becomes that of the ground. In both cases the next coefficients decide.
 ALIKE = 1e-12
 
 
 @lean_jit
 def hold_frictions(where, env, frictions):
-    """Tell the model's functions which way each friction slides, and that what sticks is not free."""
+    """Tell the model's functions, through `env`, in which direction each friction slides, and that sticking coordinates are not
+    free."""
     first = env[0].size - where[Where.OWN]
     for k in range(frictions.shape[0]):
         slides = frictions[k, FrictionColumn.SLIDES]
@@ -39,7 +42,7 @@ def hold_frictions(where, env, frictions):
 
 @lean_jit
 def slide_bits(frictions, count):
-    """What each friction does, behind the bits of `count` contacts: two bits for 0, 1 or 2, its direction and 1."""
+    """The direction of each friction plus 1 (0, 1 or 2), in two bits each, behind the bits of `count` contacts."""
     bits = 0
     for k in range(frictions.shape[0]):
         bits |= (1 + frictions[k, FrictionColumn.SLIDES]) << (count + 2 * k)
@@ -63,7 +66,7 @@ def sliding_series(frictions, work, solver, k, direction, order, g):
 
 @lean_jit
 def friction_step_size(where, settings, frictions, count, work, natural):
-    """The step, at most `natural`, that the forces of what sticks allow."""
+    """The step, at most `natural`, that the series of the friction forces of sticking coordinates allow."""
     tol = settings[Setting.TOLERANCE]
     sharp = min(tol, EXACT) if where[Where.MODE] == Mode.REST else tol
     for k in range(frictions.shape[0]):
@@ -75,9 +78,9 @@ def friction_step_size(where, settings, frictions, count, work, natural):
 
 @lean_jit
 def first_friction(where, frictions, count, work, solver, h, whole):
-    """The friction whose guard reaches 0 first within the step, when, by which of its margins, or 2 for its sliding speed.
+    """The friction whose guard reaches 0 first within the step, the instant, and its guard: margin 0 or 1, or 2 for the speed.
 
-    Then whether a touch at the step's end makes it too long.
+    Then whether the step is too long to decide on a touch near its end.
     """
     order, hit, first, which, shorter = where[Where.ORDER], -1, NEVER, 2, False
     for k in range(frictions.shape[0]):
@@ -105,9 +108,9 @@ def first_friction(where, frictions, count, work, solver, h, whole):
 
 @lean_jit
 def reach(where, state, env, model, work, solver, frictions, count, t, origin, k, which, later):
-    """Take the motion to the instant at which a friction's guard is 0, with the tangent's columns.
+    """Take the motion, with the tangent's columns, to the instant at which a friction's guard is 0.
 
-    What slides has then exactly the speed of its ground: dt = -(z - w_c) / a.
+    If that is the sliding speed, it is set to exactly 0; the instant moves by dt = -(z - w_c) / a.
     """
     own, dof, rest = where[Where.OWN], where[Where.DOF], frictions[k, FrictionColumn.COORDINATE]
     shifts = State.COORDINATES + 2 * dof
@@ -131,10 +134,10 @@ def reach(where, state, env, model, work, solver, frictions, count, t, origin, k
 
 @lean_jit
 def undecided(where, state, solver, frictions):
-    """The frictions, as bits, that have the speed of their ground; of the others it is noted which way they slide.
+    """The frictions with exactly the speed of their ground, as bits; for the others the direction in which they slide is noted.
 
-    One whose sliding speed has changed its sign within rounding, at the instant of another one's event as of blocks that move
-    alike, has its own event next: each takes the tangent's columns to its own instant.
+    If blocks move alike, the sliding speed of one may have changed its sign, within rounding, at the instant of another one's
+    event. Its direction is then kept, so that it has its own event next, to which it takes the tangent's columns.
     """
     bits = 0
     for k in range(frictions.shape[0]):
@@ -149,7 +152,8 @@ def undecided(where, state, solver, frictions):
 
 @lean_jit
 def choose_slides(frictions, candidates, choice):
-    """Let each of the candidates stick, slide forwards or backwards, by the digits of a number; False if others have one."""
+    """Let each of the candidates stick, slide forwards or slide backwards, by the base-3 digits of `choice`; False if a friction
+    that is no candidate has a digit other than 0."""
     for k in range(frictions.shape[0]):
         digit, choice = choice % 3, choice // 3
         if candidates >> k & 1:
@@ -161,7 +165,8 @@ def choose_slides(frictions, candidates, choice):
 
 @lean_jit
 def slides_so(where, frictions, count, work, solver, candidates):
-    """Whether the first Taylor coefficients that are not 0 confirm what the candidates do; notes how many are 0."""
+    """Whether the first non-zero Taylor coefficients of their guards confirm the choice for the candidates; notes how many
+    coefficients before them are 0."""
     order, g = where[Where.ORDER], work[Work.GAP]
     for k in range(frictions.shape[0]):
         if not candidates >> k & 1:
@@ -187,7 +192,8 @@ def slides_so(where, frictions, count, work, solver, candidates):
 
 @lean_jit
 def record_slides(where, state, contacts, frictions, events, before, t, shifts):
-    """Record what has begun to stick or to slide, or has turned round, since it did what `before` says, in the bits of 3^k."""
+    """Record the frictions that have begun to stick or to slide, or have reversed, since the directions `before` (base-3
+    digits)."""
     for k in range(frictions.shape[0]):
         was, slides = before % 3 - 1, frictions[k, FrictionColumn.SLIDES]
         before //= 3
@@ -199,7 +205,7 @@ def record_slides(where, state, contacts, frictions, events, before, t, shifts):
 
 @lean_jit
 def slides_before(frictions):
-    """What all frictions do, as the digits of a number to the base 3."""
+    """The directions of all frictions plus 1, as the base-3 digits of a number."""
     number = 0
     for k in range(frictions.shape[0] - 1, -1, -1):
         number = 3 * number + 1 + frictions[k, FrictionColumn.SLIDES]
@@ -208,10 +214,11 @@ def slides_before(frictions):
 
 @lean_jit
 def stick_columns(where, state, solver, frictions, count):
-    """The columns of what sticks: z = w_c, by the impulses with which friction stops what slides beside it, M dz = S p.
+    """The columns of sticking coordinates: z = w_c, by the impulses p with which friction stops them in neighbouring motions that
+    slide, M dz = S p.
 
-    At an instant at which it begins to stick nothing is left to stop. At a start motions beside it slide for a time of the order
-    of their sliding speeds, in which nothing else changes.
+    When a friction begins to stick during the motion, no impulse is left. At the start of a motion, neighbouring motions slide
+    for a time of the order of their sliding speeds, in which nothing else changes to first order.
     """
     own, dof, block = where[Where.OWN], where[Where.DOF], solver[Solver.BLOCK]
     for j in range(where[Where.COLUMNS]):
@@ -238,7 +245,7 @@ def stick_columns(where, state, solver, frictions, count):
 
 @lean_jit
 def all_stand(where, env, solver, frictions):
-    """Whether no coordinate moves: none is free, and what sticks does so on ground that stands still."""
+    """Whether no coordinate moves: none is free, and all sticking ones do so on ground at rest."""
     for i in range(env[0].size - where[Where.OWN], env[0].size):
         if env[0][i] != 0.0:
             return False

@@ -1,4 +1,4 @@
-"""The motion of a model with several contacts while one coordinate is free: one equation, whichever coordinate that is."""
+"""The motion of a model with several contacts while only one coordinate is free: one equation for every choice of it."""
 
 from __future__ import annotations
 
@@ -10,28 +10,30 @@ from saltus.taylor import CommonForm, Expr, Trace, differentiate, number, substi
 
 @dataclass(frozen=True)
 class OneFree:
-    """What the free coordinate does, as coordinate 0; the leaves `free` say which it is.
+    """The equations of the free coordinate, which they call coordinate 0; the leaves `free` say which one it is.
 
-    A reaction is p(q) q'' + p'(q) q'^2 + ..., of an element p of the mass matrix, so P'' + ..., where P is the integral of p. Of
-    a sine or a cosine that costs no product of series, and the guards of closed contacts are sums of `curved`'' and `guards`.
+    A reaction has the form p(q) q'' + p'(q) q'^2 + ... with an entry p of the mass matrix, that is, P'' + ..., where P is the
+    integral of p. If p is a sine or cosine this saves products of series. The guard of a closed contact is the sum of the second
+    derivative of an entry of `curved` and an entry of `guards`.
     """
 
     acceleration: Expr
-    curved: list[Expr]  # P of each contact that is closed
-    guards: list[Expr]  # what is left of their reactions, then those margins that change
+    curved: list[Expr]  # P of each closed contact
+    guards: list[Expr]  # the remaining terms of their reactions, then the margins that change along the motion
     constant_guards: list[Expr]  # the other margins
 
     @property
     def roots(self) -> list[Expr]:
-        """All of them."""
+        """All expressions."""
         return [self.acceleration, *self.curved, *self.guards, *self.constant_guards]
 
 
 def equations_of_one_free(trace: Trace, margins: list[Expr]) -> OneFree | None:
-    """The equations with one free coordinate, where each coordinate has one contact; `margins` with accelerations put in.
+    """The equations with one free coordinate, if each coordinate has one contact; else None. `margins` have accelerations
+    substituted.
 
-    All contacts but that of the free coordinate are then closed, so that the other coordinates are numbers. There are none
-    for a tangent, as the derivatives to all coordinates go on.
+    All contacts but that of the free coordinate are then closed, so that the other coordinates are constants. None is given for a
+    trace with a tangent, because the derivatives of the other coordinates need not be constant.
     """
     own = trace.dof
     if len(trace.signs) < 2 or trace.rubbed or sorted(trace.held) != list(range(own)) or trace.columns:
@@ -52,7 +54,7 @@ def equations_of_one_free(trace: Trace, margins: list[Expr]) -> OneFree | None:
 
 
 def _halves(common: CommonForm, reaction: Expr, acceleration: Expr) -> tuple[Expr, Expr]:
-    """P and what is left of a reaction, p q'' + p' q'^2 + ... = P'' + ...; the reaction itself where p has no such integral."""
+    """P and the remaining terms of a reaction p q'' + p' q'^2 + ... = P'' + ...; 0 and the reaction if p has no such integral."""
     q, v, a = (Expr(op, (), 0) for op in ("coordinate", "velocity", "acceleration"))
     factor = differentiate(reaction, a)
     integral = common.integral(factor, q)
@@ -62,12 +64,12 @@ def _halves(common: CommonForm, reaction: Expr, acceleration: Expr) -> tuple[Exp
 
 
 def _accelerations(own: int, j: int) -> dict[Expr, Expr]:
-    """The accelerations where only coordinate j is free."""
+    """The substitution for the accelerations if only coordinate j is free."""
     return {Expr("acceleration", (), i): Expr("acceleration", (), 0) if i == j else number(0.0) for i in range(own)}
 
 
 def _leaves(trace: Trace, j: int) -> dict[Expr, Expr]:
-    """What coordinates, velocities and `free` are where only coordinate j is free."""
+    """The substitution for coordinates, velocities and `free` if only coordinate j is free."""
     leaves = {}
     for i, position in zip(trace.held, trace.positions, strict=True):
         leaves[Expr("coordinate", (), i)] = Expr("coordinate", (), 0) if i == j else position

@@ -1,4 +1,4 @@
-"""What is seen along a smooth segment of a motion with several contacts, in the places of `SegmentExtremes`.
+"""The extremes along a smooth segment of a motion with several contacts, in the places of `SegmentExtremes`.
 
 Its compiled part goes into one module with that of `contact_segments.py`.
 """
@@ -23,7 +23,7 @@ ENDS = 1e-6  # share of a segment at both of its ends in which no extremum is lo
 
 @lean_jit
 def least_of(c, order, h, t, poly, roots, seen, place):
-    """Take in the inner minima of a series within a step: the least of them, and when."""
+    """Update the least inner minimum at `place` of `seen`, and its time, with the minima of a series within a step."""
     size = abs(c[0])
     for k in range(1, order + 1):
         poly[k - 1] = k * c[k] * h**k
@@ -38,7 +38,7 @@ def least_of(c, order, h, t, poly, roots, seen, place):
 
 @lean_jit
 def extremes_at_step(where, state, model, contacts, work, solver, t, h, begin, end, roots, seen, least):
-    """Take in what a step shows: turning points of the coordinates, inner minima of the guards, the margins' least values."""
+    """Update the extremes with a step: extrema of the coordinates, inner minima of the guards, least values of the margins."""
     order, own, count, poly = where[Where.ORDER], where[Where.OWN], contacts.shape[0], work[Work.POLYNOMIAL]
     for a in range(own):
         q, size = work[Work.POSITIONS][a], 0.0
@@ -71,7 +71,8 @@ def extremes_at_step(where, state, model, contacts, work, solver, t, h, begin, e
 
 @lean_jit
 def extremes_at_start(where, state, model, contacts, work, solver, hit, seen):
-    """Begin with the least of the reactions of closed contacts, and of the acceleration with which `hit` leaves from rest."""
+    """Begin the extremes of a segment: `PULL` is the least of the reactions of closed contacts and of the acceleration with which
+    the contact `hit` opens, if it opens from rest."""
     for k in range(seen.size):
         seen[k] = np.inf
     seen[SegmentExtremes.TOP] = -np.inf
@@ -87,7 +88,7 @@ def extremes_at_start(where, state, model, contacts, work, solver, hit, seen):
 
 @lean_jit
 def extremes_at_section(where, state, model, contacts, work, solver, t, seen):
-    """Take in the guards at the start of a segment that begins with no event: they may have their minimum just there."""
+    """Update the extremes with the guards at the start of a segment without event there: a minimum may lie just at its start."""
     own, count = where[Where.OWN], contacts.shape[0]
     for i in range(count):
         closed, x = contacts[i, ContactColumn.CLOSED] == 1, state[State.COORDINATES + contacts[i, ContactColumn.COORDINATE]]
@@ -99,7 +100,7 @@ def extremes_at_section(where, state, model, contacts, work, solver, t, seen):
 
 @lean_jit
 def extremes_at_end(work, contacts, released, seen):
-    """The least of the reactions with which a segment ends, of the contacts but the one that is released there."""
+    """Update `TAIL`, the least reaction at the end of a segment of all closed contacts but the one that is released there."""
     for i in range(contacts.shape[0]):
         reaction = work[Work.MARGINS][i, 0]
         if contacts[i, ContactColumn.CLOSED] == 1 and i != released and reaction < seen[SegmentExtremes.TAIL]:
@@ -108,10 +109,12 @@ def extremes_at_end(work, contacts, released, seen):
 
 @lean_jit
 def gap_beside(where, model, contacts, solver, plan, s, duration, ends, seen):
-    """The least gap, at the impact with which segment s of the plan ends, of another contact whose speed that changes.
+    """Update `BESIDE`, the least gap at the impact with which segment s of the plan ends, of another contact whose speed the
+    impact changes.
 
-    A minimum there is none of the smooth motion. A gap that opened as the segment began is divided by the power of the duration
-    with which it did; of the shortest segments rounding would be all that is left.
+    Such a gap may have its minimum at the impact, which no smooth segment shows. A gap that has opened at the start of the
+    segment is divided by the power of the duration with which it grows; very short segments are skipped, where only rounding
+    would be left.
     """
     own, count, hit = where[Where.OWN], contacts.shape[0], plan[s, SegmentPlan.CONTACT]
     released = plan[s - 1, SegmentPlan.KIND] == EventCode.RELEASE

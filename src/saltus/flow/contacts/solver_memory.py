@@ -14,13 +14,13 @@ from saltus.taylor import jit, lean_jit
 
 @jit
 def zeros(count):
-    """An array of 0. numba writes its own making of one out wherever it is asked for."""
+    """An array of zeros, made in a function of its own because numba would compile `np.zeros` anew at each call of it."""
     return np.zeros(count)
 
 
 @jit
 def rows_of_zeros(rows, columns):
-    """The same with two indices."""
+    """An array of zeros with two indices."""
     return np.zeros((rows, columns))
 
 

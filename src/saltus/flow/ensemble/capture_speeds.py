@@ -1,4 +1,4 @@
-"""The speeds below which the trajectories of an ensemble are proved to be captured at rest, proved once for equal parameters."""
+"""The speeds below which trajectories of an ensemble are proved to be captured at rest; equal parameters are proved once."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ import numpy as np
 from saltus.errors import ParameterError
 from saltus.systems import System
 
-MOST_SYSTEMS, MOST_PROVED = 16, 1 << 18  # systems, and parameter sets of each, whose speeds of capture are remembered
+MOST_SYSTEMS, MOST_PROVED = 16, 1 << 18  # the most systems, and parameter sets of each, whose capture speeds are kept
 
 
 def capture_speeds(
     system: System, columns: Mapping[str, np.ndarray], limits: tuple[str, ...], known: np.ndarray | None = None
 ) -> Any:
-    """The speed below which each trajectory is proved to be captured; `known` are those that need no proof, nan for the others.
+    """The speed below which each trajectory is proved to be captured; `known` holds speeds that are known already, else nan.
 
-    With several contacts it is asked only once all are closed and nothing moves: it is 0 or infinite.
+    With several contacts the speed is used only where all contacts are closed and nothing moves: it is 0 or infinite.
 
     Raises
     ------
     ParameterError
-        A margin to stop at besides the model's own, which a captured motion may still reach.
+        The motion is to stop at a margin other than the model's own ones: a captured motion may still reach it.
     """
     from saltus.bounds import keeps_rest
 
@@ -33,7 +33,7 @@ def capture_speeds(
     if asked:
         raise ParameterError(f'until="rest" proves nothing about {asked[0]}; leave out either it or stop_at', "until")
     if system.model.frictions:
-        return 0.0  # nothing is proved of what sticks
+        return 0.0  # nothing is proved about sticking frictions
     if system.model.contacts:
         return np.where(keeps_rest(system, columns), math.inf, 0.0)
     if not system.model.sides:
@@ -47,10 +47,10 @@ def capture_speeds(
 
 
 def captured_between(system: System, start: Mapping[str, np.ndarray], end: Mapping[str, np.ndarray]) -> np.ndarray:
-    """The speeds below which motions are proved to be captured under all parameters on ways from some, (n,) each, to others.
+    """The speeds below which motions are proved to be captured, for all parameters on n straight ways from `start` to `end`.
 
-    They are nan where single values must be asked, as something is proved at one end of a way and not along it. Where nothing
-    is proved at either end nothing is taken for proved between them: the speed is 0.
+    A speed is nan if a proof succeeds at one end of a way but not along all of it: then single values must be asked. It is 0 if
+    no proof succeeds at either end.
     """
     from saltus.bounds import proved_speeds
 
@@ -66,7 +66,7 @@ def captured_between(system: System, start: Mapping[str, np.ndarray], end: Mappi
 
 
 def _remembered(system: System, columns: Mapping[str, np.ndarray]) -> np.ndarray:
-    """`proved_speeds`, computed once for equal parameters: studies ask for the same ones again and again."""
+    """`proved_speeds`, remembered for equal parameters, because studies ask for the same ones many times."""
     from saltus.bounds import proved_speeds
 
     varied = {path: values for path, values in sorted(columns.items()) if values.ndim}

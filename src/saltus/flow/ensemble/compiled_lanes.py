@@ -62,7 +62,7 @@ from saltus.taylor.references import by_reference
 
 @cache
 def load_driver(several: bool = False) -> Callable[..., None]:
-    """The driver of all lanes, `run_lanes` of `driver.py`, for models with several contacts or others; without Python's lock."""
+    """The driver of all lanes, `run_lanes` of `driver.py`, for models with one or several contacts; it releases Python's lock."""
     return entry_point(load_module("lanes", _driver_text(several)).run_lanes)
 
 
@@ -90,14 +90,14 @@ def _text(several: bool, *modules: ModuleType) -> str:
 
 @cache
 def compile_driver_aside(several: bool) -> subprocess.Popen[bytes] | None:
-    """Where the driver is not on disk yet, a process that compiles it, as this one has much else to compile; else None.
+    """A process that compiles the driver while this one compiles the rest; None if the driver is already on disk.
 
-    The same for every further call, which finds that process ended.
+    Further calls return the same process, which may have ended since.
     """
     if is_compiled(module_name("lanes", _driver_text(several))):
         return None
     try:
-        found = f"import sys; sys.path[:] = {sys.path!r}; "  # as this process has come to know it
+        found = f"import sys; sys.path[:] = {sys.path!r}; "  # the other process finds packages where this one does
         call = f"{found}from {__name__} import load_driver; load_driver({several})"
         return subprocess.Popen([sys.executable, "-c", call])
     except OSError:
@@ -106,7 +106,8 @@ def compile_driver_aside(several: bool) -> subprocess.Popen[bytes] | None:
 
 @cache
 def load_helpers(several: bool = False) -> tuple[Any, ...]:
-    """What the driver calls for one lane: `lane_root`, `turning_range`, `scalar_motion`, and impacts at several contacts."""
+    """The functions that the driver calls for one lane: `lane_root`, `turning_range`, `scalar_motion`; with several contacts also
+    `contacts_impact`."""
     names = ["lane_root", "turning_range", "scalar_motion"]
     parts = [kernel_layout, lane_layout, records, roots, scalar_fallback, lane_state]
     if several:
@@ -119,12 +120,12 @@ def load_helpers(several: bool = False) -> tuple[Any, ...]:
 
 
 def load_lane_functions(trace: Trace) -> tuple[Slots, tuple[Any, ...]]:
-    """A structure's memory and its functions for lanes.
+    """The memory layout of a structure and its functions for lanes.
 
     Raises
     ------
     TraceError
-        They would be compiled for minutes.
+        Compiling them would take minutes.
     """
     check_size(trace, lanes=True)
     module = load_module("lane", generated_header(_SIGNATURES) + lane_functions_text(trace))
@@ -139,14 +140,14 @@ def load_advance(several: bool = False) -> Any:
 
 
 def compile_everything(several: bool = False) -> None:
-    """Compile the driver, its helpers and the scalar kernel, or load them where they are on disk."""
+    """Compile the driver, its helpers and the scalar kernel, or load them from disk if they are there."""
     load_driver(several)
     load_helpers(several)
     load_advance(several)
 
 
 def compile_beside(driver: subprocess.Popen[bytes], several: bool) -> None:
-    """Compile what the driver needs while another process compiles the driver, and wait for that."""
+    """Compile the helpers and the scalar kernel while another process compiles the driver, and wait for that process."""
     load_helpers(several)
     load_advance(several)
     driver.wait()

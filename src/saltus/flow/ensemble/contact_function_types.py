@@ -1,4 +1,5 @@
-"""The types of the lanes' functions for models with several contacts, in the place of those in `function_types.py`."""
+"""The types of the lanes' functions for models with several contacts; they replace those of the same names in
+`function_types.py`."""
 
 from __future__ import annotations
 

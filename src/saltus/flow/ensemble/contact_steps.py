@@ -1,7 +1,7 @@
 """The smooth motion of all lanes of a model with several contacts, in one step, up to the first closing of a gap.
 
-Its compiled part goes into one module with that of `several_contacts.py`. Where in every lane one coordinate is free, a shorter
-series does for all lanes, whichever coordinate that is (`one_free.py`).
+Its compiled part goes into one module with that of `several_contacts.py`. If exactly one coordinate is free in every lane, all
+lanes share a series of this coordinate alone, even if it is not the same one in all lanes (`one_free.py`).
 """
 
 from __future__ import annotations
@@ -15,13 +15,14 @@ from saltus.taylor import ALL, absolute, bits, fma, inline_jit, lean_jit, load, 
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
-TOGETHER = 1e-6  # of a step: gaps that close nearer to each other in time may close together, which the scalar kernel decides
-SMALL_GAP = 1e-9  # The same of a gap that is left when another one closes.
+TOGETHER = 1e-6  # Gaps that close within this share of a step may close together, which the scalar kernel decides.
+SMALL_GAP = 1e-9  # A gap smaller than this, when another one closes, may close together with it.
 
 
 @lean_jit
 def stays_positive(m, series, order, h):
-    """Bits of the lanes in which a series is positive on [0, h] for certain, by its cubic's Bernstein coefficients."""
+    """Bits of the lanes in which a series is certainly positive on [0, h]: by the Bernstein coefficients of its cubic part, and a
+    bound of the rest."""
     rest = splat(0.0)
     for k in range(order - 1, 3, -1):
         rest = fma(rest, h, absolute(load(m, series + k)))
@@ -34,7 +35,7 @@ def stays_positive(m, series, order, h):
 
 @lean_jit
 def guards_certain(m, at, sizes, h):
-    """Bits of the lanes in which every closed contact pushes over the step for certain, and every margin stays positive."""
+    """Bits of the lanes in which certainly, over the step, all reactions of closed contacts and all margins stay positive."""
     sure, count = ALL, sizes[Size.CONTACTS]
     for i in range(sizes[Size.MARGINS]):
         closed = ALL
@@ -49,7 +50,8 @@ def guards_certain(m, at, sizes, h):
 
 @inline_jit
 def first_closing(sizes, at, m, h, alive, helpers, space):
-    """The first gap that closes in the step. Returns bits of lanes in which one does, those in doubt, when, and which one."""
+    """The first gap that closes in the step. Returns bits of the lanes in which one closes, bits of the lanes in doubt, the
+    times, and the contacts."""
     order, count = sizes[Size.ORDER], sizes[Size.CONTACTS]
     hit, doubtful, tau, which = 0, 0, h, splat(0.0)
     for i in range(count):
@@ -70,7 +72,8 @@ def first_closing(sizes, at, m, h, alive, helpers, space):
 
 @inline_jit
 def put_new_state(sizes, at, m, tau, hit, which):
-    """Put the state at `tau`, with the contact that closes at its position. Returns lanes in which another gap is as small."""
+    """Put the state at `tau`, with the contact that closes exactly at its position. Returns bits of the lanes in which another
+    gap is nearly 0 as well."""
     order, count, near = sizes[Size.ORDER], sizes[Size.CONTACTS], 0
     for row in range(row_count(at)):
         positions, velocities = at[LanePart.POSITIONS] + row * SERIES_LENGTH, at[LanePart.VELOCITIES] + row * SERIES_LENGTH
@@ -90,8 +93,8 @@ def put_new_state(sizes, at, m, tau, hit, which):
 def free_step(code, sizes, at, m, settings, limits, alive, helpers, space):
     """A step of all lanes, put at NEW_*, whichever coordinates are free.
 
-    Returns bits of lanes in which a gap closes, those in which all is certain, the step, its part that is taken, the bound
-    `bend` of `sweep` for the first coordinate, and the contact that closes.
+    Returns bits of the lanes in which a gap closes, bits of the lanes in which nothing is in doubt, the length of the step, the
+    part of it that is taken, the bound `bend` of `sweep` for the first coordinate, and the contact that closes.
     """
     order = sizes[Size.ORDER]
     code[Code.SERIES](m, order)
@@ -132,7 +135,7 @@ def one_is_free(sizes, at, m):
 
 @inline_jit
 def one_free_step(code, sizes, at, m, settings, limits, alive, helpers, space):
-    """The same as `free_step` where one coordinate is free: its series stand in row 0, whichever it is."""
+    """As `free_step`, for lanes in which one coordinate is free; its series are in row 0, whichever coordinate it is."""
     order, count = sizes[Size.ORDER], sizes[Size.CONTACTS]
     x, v, sign, contact, which = splat(0.0), splat(0.0), splat(1.0), splat(0.0), splat(0.0)
     for i in range(count):
@@ -175,7 +178,8 @@ def one_free_step(code, sizes, at, m, settings, limits, alive, helpers, space):
 
 @inline_jit
 def of_free(m, sizes, first, which):
-    """What the part that begins at `first` has of the coordinate that was free in the step: that of the contact `which`."""
+    """The value, in the part of the memory that begins at `first`, for the coordinate of the contact `which`, which was free in
+    the step."""
     value = splat(0.0)
     for i in range(sizes[Size.CONTACTS]):
         was_free = mask(bits(absolute(which - 1.0 * i) < 0.5))
@@ -185,7 +189,7 @@ def of_free(m, sizes, first, which):
 
 @inline_jit
 def pass_ends_of_free(m, at, sizes, h, bend, which, past, helpers, space):
-    """`pass_ends` where one coordinate was free, that of the contact `which`: the others stay where they are."""
+    """`pass_ends` for lanes in which only the coordinate of the contact `which` was free: the other coordinates stay constant."""
     since, chosen = load(m, Slot.PERIOD_END) - load(m, Slot.NOW), mask(past)
     x, v = both_at(m, at[LanePart.POSITIONS], at[LanePart.VELOCITIES], sizes[Size.ORDER], load(m, Slot.FREE_POSITION), since)
     for i in range(sizes[Size.CONTACTS]):

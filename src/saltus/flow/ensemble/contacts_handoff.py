@@ -1,4 +1,4 @@
-"""A lane of a model with several contacts in the scalar kernel, and its impacts.
+"""The scalar kernel as it is used for one lane of a model with several contacts, and the impacts of a lane.
 
 Its compiled part goes into one module with that of `lane_state.py`; the driver calls it through pointers.
 """
@@ -70,7 +70,7 @@ def scalar_motion(lane, scalar, sizes, at, m, flags, settings, lanes, parameters
         status = advance(where, state, limits, env, model, rows, steps, events)
         detail = record_impacts(lane, where, m, contacts, events)
         record_extrema(lane, where, m, steps, poly)
-        many = get(m, Slot.IMPACTS, lane) > get(m, Slot.NEXT_CHECK, lane)  # the driver asks whether they are too many
+        many = get(m, Slot.IMPACTS, lane) > get(m, Slot.NEXT_CHECK, lane)  # then the driver checks their number
         if (status != Status.FULL and status != Status.PAUSED) or many or control[0] != 0:
             break
     put_state(lane, at, m, flags, lanes, where, state)
@@ -86,10 +86,10 @@ def scalar_motion(lane, scalar, sizes, at, m, flags, settings, lanes, parameters
 
 @cached_jit(CONTACTS_IMPACT)
 def contacts_impact(lane, hit, scalar, sizes, at, m, settings, lanes, parameters, tables, space):
-    """Apply the impact law to a lane at its new state, where the contacts in `hit` close; returns whether that is all there is.
+    """Apply the impact law to a lane at its new state, where the contacts in `hit` close; returns 1 if that was enough.
 
-    It is not, and nothing has changed, where the law has no solution, where speeds are left that may be the end of an
-    accumulation, and where everything is at rest.
+    Otherwise it returns 0 and leaves the lane unchanged, for the scalar kernel to take over: where the law has no solution, where
+    the remaining speeds are so small that an accumulation may end, and where everything is at rest.
     """
     (_, _, where, state, contacts, solver), model = space, scalar[1]
     own, count, labels, rates = sizes[Size.OWN], sizes[Size.CONTACTS], lanes[LaneArray.LABELS], solver[Solver.RATES]
@@ -97,7 +97,7 @@ def contacts_impact(lane, hit, scalar, sizes, at, m, settings, lanes, parameters
     breaks, table = own_records(tables, trajectory)
     env = (parameters[trajectory], lanes[LaneArray.CONSTANTS][lane], breaks, table)
     where[Where.DOF], where[Where.OWN], where[Where.PIECE] = own, own, labels[lane, LaneLabel.PIECE]
-    for row in range(2 * own):  # positions, then velocities, lie one behind the other
+    for row in range(2 * own):  # velocities follow the positions in both memories
         state[State.COORDINATES + row] = get(m, at[LanePart.NEW_POSITION] + row, lane)
     contacts_of(lane, sizes, at, m, contacts)
     regular, chosen, speed = couple(where, state, env, model, contacts, solver), hit | closed_bits(contacts), np.inf

@@ -1,4 +1,4 @@
-"""Which contacts of a lane are closed, of a model with several.
+"""The closed contacts of a lane, for models with several contacts.
 
 Its compiled part goes into one module with that of `several_contacts.py`, and with that of `contacts_handoff.py`.
 """
@@ -28,9 +28,9 @@ def tell_closed(lane, at, m, contacts):
 
 @lean_jit
 def contacts_of(lane, sizes, at, m, contacts):
-    """Fill the scalar kernel's `contacts` of a lane that moves smoothly: an open gap may be 0 at the start.
+    """Fill the scalar kernel's `contacts` for a lane that moves smoothly; a gap that has just opened may still be 0.
 
-    After how many impacts it is tried again whether they come to rest stays known: trying may take as long as all that follow.
+    `WAITS` is kept: looking for the end of an accumulation too often could take as long as all its impacts.
     """
     closed = int(get(m, Slot.SIDE, lane)) - 1
     for i in range(contacts.shape[0]):

@@ -1,4 +1,4 @@
-"""What other rooms read from the dataset of an ensemble: why each motion ended, and its stroboscopic states."""
+"""Functions that read the dataset of an ensemble: why each motion ended, and its stroboscopic states."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def stop_names(dataset: xarray.Dataset) -> np.ndarray[Any, Any]:
     Parameters
     ----------
     dataset
-        What `simulate_many` gave.
+        The dataset that `simulate_many` gave.
 
     Examples
     --------
@@ -47,7 +47,7 @@ def stroboscopic(system: System, dataset: xarray.Dataset) -> np.ndarray[Any, Any
     system
         What moved.
     dataset
-        What `simulate_many` gave, with "state" among its samples.
+        The dataset that `simulate_many` gave, with "state" among its samples.
 
     Examples
     --------

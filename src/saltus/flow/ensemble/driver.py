@@ -1,18 +1,20 @@
-"""Many trajectories at once: a group of lanes, each with its own time, step, side and parameters, refilled as they end.
+"""A group of lanes that moves many trajectories at once. Each lane has its own time, step, side and parameters, and takes the
+next trajectory when its own has ended.
 
 The compiled parts of `kernel_layout.py`, `lane_layout.py`, `contact_side.py`, `lane_steps.py`, `meeting.py`, `sampling.py`,
 `one_contact.py`, `forcing_periods.py` and this file are one module, compiled once for all models, for the width of this machine's
 registers. The functions of a structure, `code`, come through pointers. For models with several contacts there is a second module
 with `several_contacts.py` in the place of `one_contact.py`.
 
-A step of all lanes: Taylor series; a step for each lane; a sweep of Horner's rule that gives the end of the step and bounds the
-gap; the root in the lanes whose gap has one for certain; impacts. A lane whose step shows anything else -- rest, slow impacts
-that may accumulate, a gap that cannot be decided, a limit, a number out of range -- is moved by the scalar kernel
-(`scalar_handoff.py`) from the start of that step. No lane sees another one, so results depend neither on the width nor on the
-order.
+A step of all lanes computes the Taylor series; the length of the step in each lane; the end of the step and bounds of the gap, by
+one sweep of Horner's rule; the root in the lanes whose gap certainly has one; and the impacts. If anything else may happen in the
+step of a lane -- rest, slow impacts that may accumulate, a gap that cannot be decided, a limit, a number out of range -- the
+scalar kernel moves this lane from the start of the step on (`scalar_handoff.py`). Lanes do not affect one another, so that
+results depend neither on the width nor on the order.
 
-A step may go past the end of a forcing period: the state there is then read off its series (`sampling.pass_ends`), and the next
-period begins, for all lanes at once (`begin_together`) or for those that are waited for (`forcing_periods.arrive`).
+A step may go past the end of a forcing period. The state there is then evaluated from the step's series (`sampling.pass_ends`),
+and the next period begins: for all lanes at once (`begin_together`), or lane by lane where the end of the period has further
+consequences (`forcing_periods.arrive`).
 
 `m` is the lanes' memory, in slots of one vector (`lane_layout.py`). `jobs` and `results` are arrays with a row for each
 trajectory. `space` begins with room for two polynomials of one lane.
@@ -77,7 +79,8 @@ def expand_records(sizes, at, m, flags, lanes, tables, row):
 
 @inline_jit
 def begin_together(m, free):
-    """Begin the next forcing period in lanes that are past the end of one, where it is as long (see `forcing_periods.arrive`)."""
+    """Begin the next forcing period in lanes whose step went past the end of one, if the next one is as long (compare
+    `forcing_periods.arrive`)."""
     going = mask(free)
     begin, end, period = load(m, Slot.PERIOD_START), load(m, Slot.PERIOD_END), load(m, Slot.PERIOD) + 1.0
     replace(m, Slot.NOW, going, begin + (load(m, Slot.NOW) - end))
@@ -127,7 +130,7 @@ def run_with(
             lane = first_lane(concerned)
             concerned &= concerned - 1
             status, detail = Status.PAUSED, 0
-            # First, as slow impacts need the scalar kernel in every step.
+            # This check comes first, as lanes with slow impacts need the scalar kernel in every step.
             if (checked >> lane) & 1 and unresolved(lane, sizes, m):
                 status = Status.UNRESOLVED
             elif (away >> lane) & 1:

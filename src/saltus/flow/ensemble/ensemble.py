@@ -27,7 +27,7 @@ from saltus.taylor import record_tables
 if TYPE_CHECKING:
     import xarray
 
-SLIVER = 1e-9  # A duration that ends so near, in forcing periods, to the end of one is meant to end there.
+SLIVER = 1e-9  # A duration that ends nearer than this share of a forcing period to the period's end is meant to end there.
 
 
 def simulate_many(
@@ -49,11 +49,11 @@ def simulate_many(
     progress: Progress = silent,
     **coordinates: Any,
 ) -> xarray.Dataset:
-    """Exact trajectories from many states and with many parameters, as `simulate` follows each, and many times as fast.
+    """Exact trajectories from many states and with many parameters: each as `simulate` would follow it, but many times faster.
 
-    Initial coordinates, velocities, times and parameters are numbers or arrays, which broadcast together as NumPy's do; with
-    `xarray.DataArray`s by the names of their dimensions, which the result then has. Results depend neither on the number of
-    threads nor on what else is computed, to the last bit. What is computed is bounded in memory by what is asked for.
+    Initial coordinates, velocities, times and parameters are numbers or arrays, which broadcast together as in NumPy.
+    `xarray.DataArray`s broadcast by the names of their dimensions, which the result then has. To the last bit, the result of a
+    trajectory depends neither on the number of threads nor on the other trajectories. The memory needed is that of the result.
 
     Parameters
     ----------
@@ -62,15 +62,16 @@ def simulate_many(
     parameters
         Arrays by dotted path, such as {"load.horizontal.amplitude": np.linspace(0, 1, 101)}.
     sample
-        What is kept of each of the `last` forcing periods, see `Sample`. Periods are counted from the start, and the one
-        in which the trajectory ends is kept, however short. Of "extrema" and "speed" the whole motion's are returned too.
+        The quantities that are kept for each of the `last` forcing periods, see `Sample`. Periods are counted from the start; the
+        period in which the trajectory ends is kept, however short it is. "extrema" and "speed" are also returned for the whole
+        motion.
     last
-        Of how many forcing periods, counted back from the end; "all" keeps every one.
+        For how many forcing periods samples are kept, counted back from the end; "all" keeps every one.
     until
         Ends a trajectory early, see `Until`.
     sensitivities
-        Dotted paths of parameters: adds the derivatives of the end state to the initial one and to them, at a
-        fixed time; but the end of n periods moves with "load.frequency", and that at a margin with the margin.
+        Dotted paths of parameters. Adds the derivatives of the end state to the initial state and to these parameters, at
+        a fixed time; but the end after n periods moves with "load.frequency", and an end at a margin with the margin.
     threads
         How many cores to use; by default all.
     velocity, periods, duration, tol, time, side, stop_at, progress, coordinates
@@ -86,7 +87,7 @@ def simulate_many(
     Raises
     ------
     ParameterError
-        An argument without meaning. A trajectory that cannot go on raises nothing: `stop` says so.
+        An argument has no meaning. A trajectory that cannot go on raises no error: `stop` says so.
 
     Examples
     --------
@@ -121,7 +122,7 @@ def run_ensemble(
     last: int | str = 1,
     captured: np.ndarray | None = None,
 ) -> EnsembleResult:
-    """Compile what is not there yet, and run the trajectories; `captured` are speeds of capture that are known already."""
+    """Compile the code that is not there yet, and run the trajectories; `captured` holds speeds of capture that are known."""
     driver = compile_driver_aside(system.model.held)
     run = program(system, wanted.limits, wanted.paths)
     if system.model.sides:
@@ -142,7 +143,7 @@ def run_ensemble(
 
 
 def compiled_lanes(system: System, run: Program, wanted: Wanted, kept: int) -> Lanes:
-    """The compiled lanes of a system and what they are to keep."""
+    """The compiled lanes of a system, with the settings for the samples that they keep of each trajectory."""
     key = run.structure.module.__name__
     if key not in _functions:
         _functions[key] = load_lane_functions(run.trace)
@@ -166,7 +167,7 @@ _functions: dict[str, Any] = {}
 
 
 def _jobs(system: System, run: Program, inputs: Inputs, periods: float | None, duration: float | None, side: int) -> Jobs:
-    """The trajectories as the driver takes them."""
+    """The trajectories in the arrays that the driver takes."""
     known = [path for path, _ in numbers(system)]
     columns = {known.index(path): np.broadcast_to(a, inputs.size) for path, a in inputs.parameters.items()}
     states = _first_states(inputs, len(system.model.coordinates), run.structure.module.COLUMNS)
@@ -184,9 +185,10 @@ def _jobs(system: System, run: Program, inputs: Inputs, periods: float | None, d
 
 
 def _from_the_start(at: Clock) -> tuple[Any, Any]:
-    """The last forcing period and the local time at the end, if periods are counted from the start, with its phase.
+    """The last forcing period and the local time at the end, where periods are counted from the start of the motion, at its
+    phase.
 
-    What is longer than whole periods by no more than rounding ends in the last of these.
+    A motion that is longer than a whole number of periods by rounding only ends with the last of these.
     """
     part = np.divide(at.end - at.local, at.length, out=np.zeros(np.shape(at.end)), where=np.greater(at.length, 0))
     back = np.where(part == 0.0, 0, np.minimum(1 - np.ceil(part - SLIVER), at.last - at.first))

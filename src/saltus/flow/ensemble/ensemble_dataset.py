@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from saltus.flow.ensemble.inputs import Inputs
     from saltus.systems import Model, System
 
-# What a dataset has besides the coordinates and velocities of the model and what is called after those.
+# The names in a dataset other than the coordinates and velocities of the model and names that are made of these.
 FIXED = (
     *(
         "time",
@@ -50,20 +50,20 @@ def start_name(name: str) -> str:
 
 
 def extrema_names(names: tuple[str, ...]) -> tuple[str, str]:
-    """The names in a dataset of the extrema: of the coordinate, or of all of several, the largest of which counts."""
+    """The names in a dataset of the largest and the least value of the coordinate; of several coordinates, of any of them."""
     of = names[0] if len(names) == 1 else "coordinate"
     return f"largest_{of}", f"smallest_{of}"
 
 
 def result_names(names: tuple[str, ...]) -> set[str]:
-    """Every name that a dataset may need for itself, of a model with these coordinates."""
+    """All names of variables and dimensions that a dataset of a model with these coordinates may have."""
     states, extrema = state_names(names), extrema_names(names)
     further = [*(f"{kind}_{name}" for kind in ("sampled", "start") for name in states), *(f"overall_{name}" for name in extrema)]
     return {*FIXED, *DIMENSIONS, *states, *extrema, *further}
 
 
 def to_dataset(result: EnsembleResult) -> xarray.Dataset:
-    """The ends of all trajectories and what was sampled of them."""
+    """The dataset of an ensemble: the ends of all trajectories and their samples."""
     import xarray
 
     system, inputs = result.system, result.inputs
@@ -97,7 +97,7 @@ class _Writer:
 
         reshaped = values.reshape((*self.shape, *values.shape[1:]))
         attributes = {"units": unit, "long_name": text} | more
-        # `fastpath`, as xarray would import Dask, where there is one, to see that a numpy array is none of Dask's
+        # `fastpath` keeps xarray from importing Dask to see that a NumPy array is no array of Dask
         self.variables[name] = xarray.Variable((*self.dims, *extra), reshaped, attributes, fastpath=True)
 
 
@@ -122,7 +122,7 @@ def _add_ends(writer: _Writer, result: EnsembleResult) -> None:
 
 
 def _masks(names: list[str]) -> dict[str, Any]:
-    """What the bits of a number stand for, as the CF conventions write it."""
+    """The attributes of the CF conventions that say what the bits of a number stand for."""
     return {"flag_masks": np.array([1 << i for i in range(len(names))], dtype=np.int16), "flag_meanings": " ".join(names)}
 
 
@@ -137,7 +137,7 @@ def _add_gains(writer: _Writer, system: System, inputs: Inputs) -> None:
 
 
 def _add_inputs(writer: _Writer, inputs: Inputs) -> dict[str, float]:
-    """The arguments: arrays as variables, unless a coordinate is the same; returns those that are one number."""
+    """Add arguments that are arrays as variables, unless a coordinate holds them; returns the arguments that are one number."""
     single = {}
     for name, values in inputs.values.items():
         parameter = name in inputs.paths
@@ -171,12 +171,12 @@ def _add_stops(writer: _Writer, result: EnsembleResult) -> None:
 
 
 def _flags(names: tuple[str, ...]) -> dict[str, Any]:
-    """What the numbers 0, 1, ... stand for, as the CF conventions write it."""
+    """The attributes of the CF conventions that say what the numbers 0, 1, ... stand for."""
     return {"flag_values": np.arange(len(names), dtype=np.int8), "flag_meanings": " ".join(names)}
 
 
 def _add_samples(writer: _Writer, result: EnsembleResult) -> None:
-    """What was kept of the last forcing periods, and the same of the whole motion."""
+    """Add the samples of the last forcing periods, and the extrema and least speeds of the whole motions."""
     first, extrema, sample, numbers = writer.names[0], extrema_names(writer.names), result.wanted.sample, result.ends.numbers
     slowest = "the least speed before an impact, inf without impacts"
     unit = writer.units[first]
@@ -202,8 +202,9 @@ def _add_samples(writer: _Writer, result: EnsembleResult) -> None:
 def _add_derivatives(writer: _Writer, result: EnsembleResult, paths: tuple[str, ...]) -> None:
     """The derivatives of the end state to the initial one and to parameters, (..., state, column).
 
-    The time at the start is fixed. The time at the end is, too, but for two: where periods were asked for and the motion
-    ends after n of them, start + n 2 pi / W moves with the frequency W; and where a margin ends it, with the margin.
+    The time at the start is fixed, and so is the time at the end, with two exceptions. If periods were asked for and the motion
+    ends after n of them, its end, start + n 2 pi / W, moves with the frequency W. If it ends at a margin, the end moves with the
+    margin.
     """
     states = [*writer.names, *writer.rates]
     ends, own, rows, columns = result.ends, len(writer.names), result.rows, [*states, *paths]
@@ -214,7 +215,7 @@ def _add_derivatives(writer: _Writer, result: EnsembleResult, paths: tuple[str, 
     shifts = ends.numbers[:, EndNumber.RATES + own :]
     slope = np.concatenate([result.last[:, own:], rates], axis=1)
     limited = ends.of(EndLabel.STATUS) == Status.LIMITED
-    with np.errstate(invalid="ignore"):  # the instant of a margin met without speed has no derivative
+    with np.errstate(invalid="ignore"):  # the instant at which a margin is reached without speed has no derivative
         derivative[limited] += slope[limited, :, None] * shifts[limited, None, :]
     if result.wanted.periods is not None and FREQUENCY in paths:
         at_period_end = np.isin(ends.of(EndLabel.STATUS), (Status.DONE, Status.SETTLED))

@@ -1,4 +1,4 @@
-"""How the trajectories of an ensemble ended and what was sampled of them, read from what the lanes have written."""
+"""The ends and the samples of the trajectories of an ensemble, read from the arrays that the lanes have written."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ NUMBERS = {stop: number for number, stop in enumerate(Stop)}  # in a dataset
 
 @dataclass(frozen=True, eq=False)
 class EnsembleResult:
-    """The trajectories of an ensemble, a row for each, whatever its shape."""
+    """The results of an ensemble, with a row for each trajectory, whatever the ensemble's shape."""
 
     system: System
     inputs: Inputs
@@ -42,7 +42,7 @@ class EnsembleResult:
 
     @property
     def rows(self) -> int:
-        """Coordinates and the columns of their tangent."""
+        """The number of coordinates, including those of the tangent's columns."""
         return int(self.jobs.states.shape[1] // 2)
 
     @property
@@ -53,7 +53,7 @@ class EnsembleResult:
 
     @property
     def held(self) -> np.ndarray:
-        """Which are held at the contact at the end, at rest or by impacts too small to be followed, (n,)."""
+        """Which trajectories are held at the contact at the end, at rest or in chatter, (n,)."""
         mode = self.ends.of(EndLabel.MODE)
         return np.asarray((mode == Mode.REST) | (mode == Mode.CHATTER))
 
@@ -70,7 +70,7 @@ class EnsembleResult:
 
     @property
     def whole_periods(self) -> np.ndarray:
-        """How many forcing periods later a trajectory ended than it began, by their numbers; (n,)."""
+        """The number of the forcing period in which a trajectory ended less that in which it began, (n,)."""
         return np.asarray(self.ends.of(EndLabel.PERIOD) - self.jobs.labels[:, JobLabel.FIRST_PERIOD])
 
     @property
@@ -87,7 +87,7 @@ class EnsembleResult:
         for reason, stop in STOPS.items():
             numbers[reasons == reason] = NUMBERS[stop]
         numbers[(reasons == Status.DONE) & (self.ends.of(EndLabel.MODE) == Mode.REST)] = NUMBERS[Stop.REST]
-        if self.system.model.singularity:  # the model says what it means that its steps shrink to nothing
+        if self.system.model.singularity:  # steps that shrink to nothing mean a singularity that the model names
             numbers[reasons == Status.STALLED] = NUMBERS[Stop.SINGULAR]
         return numbers
 
@@ -102,7 +102,7 @@ class EnsembleResult:
 
     @cached_property
     def samples(self) -> dict[Sample, np.ndarray]:
-        """What was kept of the last forcing periods, in the order of time, (n, kept, columns); nan where there were fewer."""
+        """The samples of the last forcing periods, in the order of time, (n, kept, columns); nan where there were fewer."""
         kept, done = self.ends.samples.shape[1], self.ends.of(EndLabel.PERIODS_DONE)
         order = (done[:, None] + np.arange(kept)) % kept  # the oldest first
         samples = np.take_along_axis(self.ends.samples, order[:, :, None], axis=1)

@@ -1,4 +1,4 @@
-"""A trajectory in its lane: how it gets there, goes from one forcing period to the next, and leaves.
+"""A trajectory in its lane: its start, its way from one forcing period to the next, and its end.
 
 Its compiled part goes into one module with that of `driver.py`.
 """
@@ -73,7 +73,7 @@ def put_all(m, first, lane, values):
 
 @inline_jit
 def impacts_between_checks(sizes):
-    """After how many impacts it is looked whether there are too many."""
+    """The number of impacts between two checks whether there are too many."""
     return BURST if sizes[Size.CONTACTS] > 0 else MOST_IMPACTS
 
 
@@ -95,16 +95,17 @@ def begin_time(lane, sizes, m, numbers, labels):
 
 @inline_jit
 def first_recorded(last, sizes):
-    """The first forcing period of which extrema are recorded where the motion goes on to the last one.
+    """The first forcing period in which extrema are recorded, if the motion goes on up to period `last`.
 
-    It is one before those that are kept, as a step past its end begins the next one; the last one may have no length.
+    It is one before those that are kept, because a step that goes past its end already belongs to the next one; and one more, as
+    the last period may have no length.
     """
     return -np.inf if sizes[Size.FROM_START] > 0 else last - sizes[Size.KEPT] - 1.0
 
 
 @inline_jit
 def begin_overall(lane, m):
-    """Start what is recorded of the whole trajectory."""
+    """Begin the records of the whole trajectory."""
     put(m, Slot.OVERALL_HIGHEST, lane, -np.inf)
     put(m, Slot.OVERALL_LOWEST, lane, np.inf)
     put(m, Slot.OVERALL_LEAST_SPEED, lane, np.inf)
@@ -113,7 +114,7 @@ def begin_overall(lane, m):
 
 @inline_jit
 def begin_records(lane, sizes, at, m):
-    """Start what is recorded of a forcing period, with the positions at its beginning."""
+    """Begin the records of a forcing period, with the positions at its beginning."""
     high = low = get(m, at[LanePart.POSITION], lane)
     for row in range(1, sizes[Size.OWN]):
         x = get(m, at[LanePart.POSITION] + row, lane)
@@ -144,13 +145,13 @@ def period_end(lane, m, lanes):
 
 @inline_jit
 def begin_period(lane, sizes, m, lanes, tables):
-    """Set where the forcing period of a lane ends, and beyond which time no step goes.
+    """Set the end of a lane's forcing period, and the time beyond which no step goes.
 
-    That is one period later, so that a step may go past the end of the period, or the end of the motion if that comes earlier.
-    The records' breakpoints end both.
+    This time is one period after the end, so that a step may go past the end; it is the end itself if the motion ends in this
+    period or the next. Both are at most the next breakpoint of the load's records.
     """
     labels = lanes[LaneArray.LABELS]
-    breaks = tables[0]  # their own row of it as an array of its own would be counted as a reference, by a locked instruction
+    breaks = tables[0]  # indexed with `own`: a row as an array of its own would need a locked instruction to count references
     own = min(labels[lane, LaneLabel.TRAJECTORY], breaks.shape[0] - 1)
     period, last, length = int(get(m, Slot.PERIOD, lane)), labels[lane, LaneLabel.LAST_PERIOD], get(m, Slot.PERIOD_LENGTH, lane)
     origin, end = period * length, period_end(lane, m, lanes)
@@ -170,8 +171,8 @@ def begin_period(lane, sizes, m, lanes, tables):
 
 @inline_jit
 def end_here(lane, sizes, at, m):
-    """Take the state of a lane for that at the end of its forcing period (compare `sampling.pass_ends`)."""
-    for row in range(2 * row_count(at)):  # positions, then velocities, lie one behind the other
+    """End the forcing period of a lane at its present state (compare `sampling.pass_ends`)."""
+    for row in range(2 * row_count(at)):  # the slots of velocities follow those of positions
         put(m, at[LanePart.ENDED_POSITION] + row, lane, get(m, at[LanePart.POSITION] + row, lane))
     put(m, Slot.ENDED_SIDE, lane, get(m, Slot.SIDE, lane))
     for j in range(4):
@@ -205,7 +206,7 @@ def keep_sample(lane, sizes, at, m, lanes, results):
 
 @inline_jit
 def end_period(lane, sizes, at, m, lanes, results):
-    """Keep a forcing period that is over; returns the period with which the trajectory repeats itself, or 0."""
+    """Keep the state at the end of a forcing period; returns the period after which the trajectory repeats itself, or 0."""
     labels, numbers, states, agreements = lanes[0], lanes[1], lanes[4], lanes[5]  # in the places of `LaneArray`
     if sizes[Size.EVERY_END] > 0:
         keep_sample(lane, sizes, at, m, lanes, results)
@@ -226,7 +227,7 @@ def end_period(lane, sizes, at, m, lanes, results):
 
 @inline_jit
 def total_up(lane, m):
-    """Add what was recorded of a forcing period to what is recorded of the trajectory."""
+    """Add the records of a forcing period to those of the whole trajectory."""
     put(m, Slot.OVERALL_IMPACTS, lane, get(m, Slot.OVERALL_IMPACTS, lane) + get(m, Slot.IMPACTS, lane))
     put(m, Slot.OVERALL_HIGHEST, lane, max(get(m, Slot.OVERALL_HIGHEST, lane), get(m, Slot.HIGHEST, lane)))
     put(m, Slot.OVERALL_LOWEST, lane, min(get(m, Slot.OVERALL_LOWEST, lane), get(m, Slot.LOWEST, lane)))
@@ -235,9 +236,9 @@ def total_up(lane, m):
 
 @inline_jit
 def arrive(lane, past, sizes, at, m, lanes, tables, results):
-    """At the end of a forcing period, or `past` it, or at a breakpoint: go on.
+    """Go on from the end of a forcing period (which the step may have gone `past`), or from a breakpoint of the records.
 
-    Returns DONE, SETTLED, or PAUSED, and the period with which the trajectory repeats itself.
+    Returns DONE, SETTLED, or PAUSED, and the period after which the trajectory repeats itself.
     """
     period, now, start = int(get(m, Slot.PERIOD, lane)), get(m, Slot.NOW, lane), get(m, Slot.PERIOD_START, lane)
     last, t_end = period == lanes[LaneArray.LABELS][lane, LaneLabel.LAST_PERIOD], period_end(lane, m, lanes)
@@ -264,7 +265,7 @@ def arrive(lane, past, sizes, at, m, lanes, tables, results):
 
 @lean_jit
 def finish(lane, status, detail, code, sizes, at, m, flags, lanes, results):
-    """Write the end of a lane's trajectory; the lane is free."""
+    """Write the end of a lane's trajectory into the results, and free the lane."""
     labels = lanes[LaneArray.LABELS]
     state, numbers, ends, _ = results
     i, half = labels[lane, LaneLabel.TRAJECTORY], state.shape[1] // 2
@@ -296,7 +297,7 @@ def finish(lane, status, detail, code, sizes, at, m, flags, lanes, results):
 
 @lean_jit
 def write_rates(lane, i, code, sizes, at, m, numbers):
-    """Write how fast the velocities change at the end, and how the time of the last event moves with each column."""
+    """Write the accelerations at the end, and the shift of the last event along each column."""
     store(m, Slot.NEW_TIME, load(m, Slot.NOW))
     for row in range(2 * row_count(at)):
         store(m, at[LanePart.NEW_POSITION] + row, load(m, at[LanePart.POSITION] + row))

@@ -17,7 +17,7 @@ LANE_ROOT = _f(_f1, _i, _i, _i, _f, _f, _f, _i, _f1, _f1)
 TURNING_RANGE = types.UniTuple(_f, 2)(_f1, _i, _f, _f, _f1)
 JOBS = types.Tuple((_f2, _f2, _i2, _f2))  # states; numbers; labels; parameters
 TABLES = types.Tuple((_f2, types.Array(_f, 4, "C")))  # record breakpoints, record table; a row for each trajectory, or one
-LANES = types.Tuple((_i2, _f2, _f2, _f2, _f3, _i2))  # what goes with each lane besides the memory: see `driver.py`
+LANES = types.Tuple((_i2, _f2, _f2, _f2, _f3, _i2))  # the arrays with a row for each lane, in the places of `LaneArray`
 RESULTS = types.Tuple((_f2, _f2, _i2, _f3))  # states; numbers; labels; samples
 with pointers():
     _functions = (LANE_SERIES, LANE_IMPACT, LANE_FIELD, CONSTANTS, GEOMETRY)

@@ -19,7 +19,7 @@ from saltus.systems import System, broadcast_arrays, check_parameters, finite_ar
 
 @dataclass(frozen=True)
 class Inputs:
-    """What the trajectories start from, each input a flat array, or one number for all of them."""
+    """The starts and parameters of the trajectories: each a flat array, or one number for all of them."""
 
     dims: tuple[str, ...]
     shape: tuple[int, ...]
@@ -44,8 +44,8 @@ def read_inputs(system: System, velocity: Any, time: Any, parameters: Any, coord
     Raises
     ------
     ParameterError
-        Names that the system does not have, numbers that are none or not finite, shapes that do not fit, values
-        that the system refuses, dimensions and coordinates with the name of a result.
+        Names are unknown to the system; values are no finite numbers, or refused by the system; shapes do not fit together; or a
+        dimension or coordinate has the name of a result.
     """
     given = parameter_table(system, parameters)
     arrays = {name: finite_array(name, value) for name, value in (_starts(system, velocity, time, coordinates) | given).items()}
@@ -72,7 +72,7 @@ def _starts(system: System, velocity: Any, time: Any, coordinates: Mapping[str, 
 def _check_names(
     system: System, dims: tuple[str, ...], coords: dict[str, Any], arrays: dict[str, Any], given: Iterable[str]
 ) -> None:
-    """Refuse dimensions and coordinates that have the name of a result, or that say other numbers than the parameters are."""
+    """Refuse dimensions and coordinates with the name of a result, and coordinates that contradict the parameters."""
     results = result_names(system.model.coordinates)
     for name in (*dims, *coords):
         if name in results:

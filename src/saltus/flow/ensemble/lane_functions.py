@@ -1,4 +1,4 @@
-"""A structure's functions for lanes, and where they find everything in the memory of a group of lanes."""
+"""A structure's functions for lanes, and the layout of the memory of a group of lanes that they read and write."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from saltus.taylor import RECORD_WIDTH, Case, Expr, Places, Rows, Trace, functio
 
 @dataclass(frozen=True)
 class Slots:
-    """Where everything lies in the memory of a group of lanes, in slots of one vector (see `memory_layout.py`)."""
+    """The sizes of the parts of the memory of a group of lanes, in slots of one vector (see `memory_layout.py`)."""
 
     rows: int  # coordinates, those of the sensitivities included
-    own: int  # the model's
+    own: int  # the model's own coordinates
     parameters: int
     contacts: int  # of a model with several
     frictions: int
@@ -59,14 +59,14 @@ def slots_of(trace: Trace) -> Slots:
 
 
 def lane_functions_text(trace: Trace) -> str:
-    """The source of `lane_series`, `lane_impact` and `lane_field`, and of a model with several contacts `lane_one_free`."""
+    """The source of `lane_series`, `lane_impact` and `lane_field`; for a model with several contacts also of `lane_one_free`."""
     slots, known = slots_of(trace), constants(trace)
     functions = [_series(trace, slots, known), _impact(trace, slots, known), _field(trace, slots, known)]
     return "".join([*functions, _one_free(trace, slots, known)] if trace.several else functions)
 
 
 def _leaves(slots: Slots, time: LaneSlot, position: LanePart, velocity: LanePart) -> dict[str, tuple[str, int]]:
-    """Where the lanes' memory has the leaves of a trace, of one of the times and states in it."""
+    """The places of a trace's leaves in the lanes' memory, for one of the times and one of the states that it holds."""
     parts = {"coordinate": position, "velocity": velocity, "parameter": LanePart.PARAMETERS, "free": LanePart.FREE}
     parts |= {"constant": LanePart.CONSTANTS, "record": LanePart.RECORDS}
     numbers = {"time": time, "record_time": LaneSlot.NOW, "origin": LaneSlot.ORIGIN, "side": LaneSlot.SIDE}
@@ -78,7 +78,7 @@ def _leaves(slots: Slots, time: LaneSlot, position: LanePart, velocity: LanePart
 def _series(trace: Trace, slots: Slots, known: dict[Expr, int]) -> str:
     """`lane_series(m, order)`: the series of positions and velocities from the state, of the accelerations and of the margins.
 
-    Coefficients 0..order of positions and velocities, 0..order - 1 of the others; an even order from LOWEST_ORDER on.
+    Positions and velocities have coefficients 0..order, the others 0..order - 1; the order is even, and at least LOWEST_ORDER.
     """
 
     def rows(part: LanePart, count: int) -> list[tuple[str, int]]:
@@ -94,9 +94,9 @@ def _series(trace: Trace, slots: Slots, known: dict[Expr, int]) -> str:
 
 
 def _one_free(trace: Trace, slots: Slots, known: dict[Expr, int]) -> str:
-    """`lane_one_free(m, order)`: the same of the one coordinate that is free, as row 0.
+    """`lane_one_free(m, order)`: the same series if one coordinate is free, which is in row 0.
 
-    `OneFree.curved` are put where the other coordinates would be, the guards in the rows of margins.
+    The series of `OneFree.curved` are in the rows of the other coordinates, and the guards in the rows of margins.
     """
     leaves = _leaves(slots, LaneSlot.NOW, LanePart.POSITION, LanePart.VELOCITY)
     leaves |= {"coordinate": ("m", int(LaneSlot.FREE_POSITION)), "velocity": ("m", int(LaneSlot.FREE_VELOCITY))}
@@ -116,7 +116,7 @@ def _one_free(trace: Trace, slots: Slots, known: dict[Expr, int]) -> str:
 def _impact(trace: Trace, slots: Slots, known: dict[Expr, int]) -> str:
     """`lane_impact(m)`: the side, positions and velocities after an impact at the new state, the tangent's columns included.
 
-    Of a model with several contacts the mass matrix and E there.
+    For a model with several contacts it fills only the mass matrix and E at the new state.
     """
     if trace.several:
         entries = {LanePart.MASS: trace.mass, LanePart.RESTITUTION: trace.restitution}
@@ -135,7 +135,7 @@ def _impact(trace: Trace, slots: Slots, known: dict[Expr, int]) -> str:
 
 
 def _field(trace: Trace, slots: Slots, known: dict[Expr, int]) -> str:
-    """`lane_field(m)`: the accelerations at the new state, put where velocities after an impact would be."""
+    """`lane_field(m)`: the accelerations at the new state, in the place of the velocities after an impact."""
     first = slots.places[LanePart.AFTER_VELOCITY]
     return _at_new_state("lane_field", slots, {("m", first + row): a for row, a in enumerate(trace.acceleration)}, known)
 

@@ -4,8 +4,8 @@ Its compiled part goes into one module with that of `several_contacts.py`. The c
 
     v+ = v- + M^-1 sum_i s_i J_i,    0 <= J _|_ (v+ + E v-) >= 0
 
-is tried with an impulse at the contact that closes, then with impulses at those that are closed, too. What both of these leave
-is solved for one lane at a time (`contacts_handoff.py`).
+is solved by trying an impulse at the contact that closes alone, then impulses at this and all closed contacts. Lanes in which
+neither is a solution are solved one at a time (`contacts_handoff.py`).
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ def closed_lanes(sizes, at, m, i):
 
 @inline_jit
 def closing_lanes(i, hit, which):
-    """Bits of the lanes in which it is this contact that closes."""
+    """Bits of the lanes in which contact i is the one that closes."""
     return hit & bits(absolute(which - 1.0 * i) < 0.5)
 
 
 @inline_jit
 def aim(sizes, at, m, i, hit, which, speed):
-    """The rate of a contact's gap after the impact if an impulse acts there, -E v-."""
+    """The rate -E v- of a contact's gap after the impact, if the contact has an impulse."""
     count, factor = sizes[Size.CONTACTS], splat(0.0)
     for j in range(count):
         entry = load(m, at[LanePart.RESTITUTION] + count * i + j)
@@ -43,9 +43,9 @@ def aim(sizes, at, m, i, hit, which, speed):
 
 @lean_jit
 def resolve_impacts(code, sizes, at, m, settings, hit, which):
-    """Apply the impact law in the lanes in `hit`, where the contact `which` closes, at the new state; returns those resolved.
+    """Apply the impact law in the lanes in `hit`, where the contact `which` closes, at the new state; returns the resolved lanes.
 
-    Not resolved, and unchanged, are those in which speeds are left that may be the end of an accumulation, or no speed at all.
+    Lanes are not resolved, and unchanged, if the speeds that are left are so small that an accumulation may end, or all 0.
     """
     code[Code.IMPACT](m)
     speed = splat(0.0)
@@ -68,7 +68,7 @@ def resolve_impacts(code, sizes, at, m, settings, hit, which):
 
 @lean_jit
 def give_impulses(sizes, at, m, together, hit, which, speed):
-    """Solve for the changes of all velocities: those at the acting contacts are known, the others follow without impulses."""
+    """Solve for the jumps of all velocities: those at the acting contacts are given, and no impulse acts on the others."""
     own, count = sizes[Size.OWN], sizes[Size.CONTACTS]
     free, change = at[LanePart.IMPULSES], at[LanePart.IMPULSES] + own
     matrix = change + own
@@ -95,7 +95,7 @@ def give_impulses(sizes, at, m, together, hit, which, speed):
 
 @lean_jit
 def eliminate(m, matrix, right, size):
-    """Solve a linear system in place, without pivots: those of a positive definite matrix are positive."""
+    """Solve a linear system in place, without pivoting, which a positive definite matrix does not need."""
     for k in range(size):
         inverse = 1.0 / load(m, matrix + size * k + k)
         for row in range(k + 1, size):
@@ -113,7 +113,7 @@ def eliminate(m, matrix, right, size):
 
 @lean_jit
 def impulses_hold(sizes, at, m, settings, together, hit, which, speed):
-    """Bits of the lanes in which the changes solve the problem, nothing is left that is slow, and something is free."""
+    """Bits of the lanes in which the jumps solve the problem, no slow speed is left, and some coordinate is free afterwards."""
     own, count = sizes[Size.OWN], sizes[Size.CONTACTS]
     change, rates, good, freed = at[LanePart.IMPULSES] + own, at[LanePart.IMPULSES] + own * (own + 2), hit, splat(1.0 * own)
     for i in range(count):
@@ -135,14 +135,14 @@ def impulses_hold(sizes, at, m, settings, together, hit, which, speed):
 
 @lean_jit
 def take_impulses(sizes, at, m, together, accepted, which, speed):
-    """Put the state after the impact, and which contacts are closed, in the lanes that are accepted."""
+    """Put the state after the impact, and the closed contacts, into the accepted lanes."""
     own, count, chosen = sizes[Size.OWN], sizes[Size.CONTACTS], mask(accepted)
     change, rates, side = at[LanePart.IMPULSES] + own, at[LanePart.IMPULSES] + own * (own + 2), splat(1.0)
     for row in range(own):
         before = load(m, at[LanePart.NEW_VELOCITY] + row)
         replace(m, at[LanePart.AFTER_POSITION] + row, chosen, load(m, at[LanePart.NEW_POSITION] + row))
         replace(m, at[LanePart.AFTER_VELOCITY] + row, chosen, before + load(m, change + row))
-    for i in range(count):  # all of these before `free` changes, by which one knows what was closed
+    for i in range(count):  # all contacts before `free` changes: it still says which were closed
         closing, closed = closing_lanes(i, accepted, which), closed_lanes(sizes, at, m, i) & accepted
         stays = (closing | closed) & bits(absolute(load(m, rates + i)) <= 0.0)
         side = select(mask(stays), side + 1.0 * (1 << i), side)

@@ -1,7 +1,7 @@
-"""Where things lie in the memory of a group of lanes, and in the arrays that come with it.
+"""The layout of the memory of a group of lanes, and of the arrays that come with it.
 
-The memory `m` consists of slots of one vector, with a number for each lane. Its first slots are those of `Slot`; behind them come
-the parts of `LanePart`, as many slots as the structure needs, each part from the slot on that the array `at` lists. Members of
+The memory `m` consists of slots of one vector, with a number for each lane. Its first slots are those of `Slot`. The parts of
+`LanePart` follow, each with as many slots as the structure needs; the array `at` lists the first slot of each part. Members of
 the enumerations become plain numbers in the compiled text (see `compiled_part`).
 """
 
@@ -21,15 +21,15 @@ class Slot(IntEnum):
     NEW_TIME = LaneSlot.NEW_TIME
     NEW_SIDE = LaneSlot.NEW_SIDE
     PERIOD_END = 5  # the time at which the forcing period, or the motion, ends
-    CONTACT = 6  # the coordinate there; this slot and the next two are those of `Geometry`
+    CONTACT = 6  # the coordinate at the contact; this slot and the next two have the places of `Geometry`
     RATE_UP = 7
     RATE_DOWN = 8
-    CAPTURE_SPEED = 9  # a lower speed of the gap after an impact is proved to be captured
-    HIGHEST = 10  # of all coordinates since the forcing period began, and so on to IMPACTS
+    CAPTURE_SPEED = 9  # motions whose gap has a lower speed after an impact are proved to be captured
+    HIGHEST = 10  # the largest coordinate since the forcing period began; the next three slots are of the same time
     LOWEST = 11
     LEAST_SPEED = 12  # before an impact
     IMPACTS = 13
-    ENDED_HIGHEST = 14  # the same four for the last forcing period that has ended, and the side at its end
+    ENDED_HIGHEST = 14  # the same four for the last forcing period that has ended, then the side at its end
     ENDED_LOWEST = 15
     ENDED_LEAST_SPEED = 16
     ENDED_IMPACTS = 17
@@ -46,11 +46,11 @@ class Slot(IntEnum):
     PASSED_TOGETHER = 28  # forcing periods below this number are ended for all lanes at once
     NEXT_CHECK = 29  # the number of impacts at which it is checked next that they do not accumulate without end
     LAST_CHECK = 30  # the time at which that was last checked
-    NEW_SPEED = 31  # of an impact, before it, of a model with several contacts
+    NEW_SPEED = 31  # for a model with several contacts: the speed before an impact
     FREE_POSITION = LaneSlot.FREE_POSITION
     FREE_VELOCITY = LaneSlot.FREE_VELOCITY
-    STEP_SHARE = 34  # of the longest step, that the next one takes
-    RECORDED_FROM = 35  # number of the first forcing period of which extrema are recorded
+    STEP_SHARE = 34  # the share of the step allowed by the series that the next step takes
+    RECORDED_FROM = 35  # number of the first forcing period in which extrema are recorded
 
 
 class Size(IntEnum):
@@ -65,17 +65,17 @@ class Size(IntEnum):
     ORDER = 6  # of the lanes' series
     SCALAR_ORDER = 7
     WORKSPACE = 8  # rows, of the scalar kernel
-    KEPT = 9  # of how many of the last forcing periods something is kept
-    EXTREMA = 10  # whether they are recorded
+    KEPT = 9  # for how many of the last forcing periods samples are kept
+    EXTREMA = 10  # whether extrema are recorded
     SETTLE = 11  # whether a trajectory ends when it repeats itself
     ENDS_ASKED = 12  # whether the ends of forcing periods are asked for at all
-    EVERY_END = 13  # whether each of them is looked at
+    EVERY_END = 13  # whether every end of a forcing period needs work, as for samples or recurrences
     ONE_FREE = 14  # whether there is a series for lanes in which one coordinate is free (see `one_free.py`)
     GUARDS = 15  # of that series
     CONSTANT_GUARDS = 16
-    FRICTIONS = 17  # their coordinates stand behind those of the contacts and their signs
+    FRICTIONS = 17  # the number of frictions; their coordinates follow behind the signs of the contacts
     FROM_START = 18  # whether extrema are recorded from the start, not only in the forcing periods that are kept
-    CONTACTS = 19  # of a model with several; their coordinates stand behind, then their signs
+    CONTACTS = 19  # the number of contacts of a model with several; their coordinates, then their signs follow
 
 
 class LaneSetting(IntEnum):
@@ -83,7 +83,7 @@ class LaneSetting(IntEnum):
 
     TOLERANCE = 0
     SHORTEST_STEP = 1
-    SLOWEST_IMPACT = 2  # of the gap: what is slower may be the end of an accumulation
+    SLOWEST_IMPACT = 2  # after an impact with a lower speed of the gap, the end of an accumulation may be near
 
 
 class LaneArray(IntEnum):
@@ -92,7 +92,7 @@ class LaneArray(IntEnum):
     LABELS = 0  # see `LaneLabel`
     NUMBERS = 1  # see `LaneNumber`
     CONSTANTS = 2  # of the structure
-    GEOMETRY = 3  # of its contact; of several, what `matrices` gives
+    GEOMETRY = 3  # of its contact; with several contacts the numbers that `matrices` gives
     STATES = 4  # the last stroboscopic states, of which the oldest is overwritten
     AGREEMENTS = 5  # for each q, how many states in a row agreed with those q forcing periods before
     CONTACTS = 6  # of a model with several, the scalar kernel's array `contacts`
@@ -127,7 +127,7 @@ class Flag(IntEnum):
 
 
 class Helper(IntEnum):
-    """Places in the tuple `helpers`: what is done for one lane at a time."""
+    """Places in the tuple `helpers` of functions that work on one lane at a time."""
 
     FIRST_ROOT = 0
     TURNING_RANGE = 1
@@ -199,8 +199,8 @@ class EndLabel(IntEnum):
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
-MOST_IMPACTS = 1e6  # of a unit of time, or of a shorter forcing period: more are an accumulation that is not being resolved
-BURST = 2e4  # of them at several contacts, over which that rate is looked for: each takes a pass of the scalar kernel
-SMALLEST_SHARE = 0.25  # of a step, in which the scalar kernel's search for roots tells what is not certain
+MOST_IMPACTS = 1e6  # in a unit of time, or in a shorter forcing period: more are an accumulation that is not resolved
+BURST = 2e4  # impacts between two checks of their rate with several contacts, where each takes a pass of the scalar kernel
+SMALLEST_SHARE = 0.25  # at this share of the usual step, the scalar search for roots decides what a shorter step could not
 NO_ROOT, TOUCH = -1.0, -2.0  # instead of the time of a lane's root
 FAST = 1e300  # A state beyond this has left the range of numbers.

@@ -1,4 +1,4 @@
-"""The scalar kernel's state of one lane, and what is recorded of its steps.
+"""The state of one lane as the scalar kernel's arrays, and the records of its steps.
 
 Its compiled part goes into one module with that of `scalar_handoff.py`, or of `contacts_handoff.py`.
 """
@@ -37,7 +37,7 @@ def scalar_state(lane, sizes, at, m, flags, settings, lanes):
     where[Where.SIDES], where[Where.CHECKED] = sizes[Size.SIDES], sizes[Size.CHECKED]
     where[Where.OWN], where[Where.COLUMNS] = sizes[Size.OWN], sizes[Size.COLUMNS]
     state[State.TIME], state[State.CHATTER_SPEED] = get(m, Slot.NOW, lane), numbers[LaneNumber.CHATTER_SPEED]
-    for row in range(2 * rows):  # positions, then velocities, lie one behind the other
+    for row in range(2 * rows):  # in both memories velocities follow the positions
         state[State.COORDINATES + row] = get(m, at[LanePart.POSITION] + row, lane)
     limits[Setting.LENGTH], limits[Setting.TOLERANCE] = length, settings[LaneSetting.TOLERANCE]
     last = labels[LaneLabel.LAST_PERIOD]
@@ -68,7 +68,7 @@ def put_state(lane, at, m, flags, lanes, where, state):
     put(m, Slot.SIDE, lane, float(where[Where.SIDE]))
     for row in range(2 * rows):
         put(m, at[LanePart.POSITION] + row, lane, state[State.COORDINATES + row])
-    for j in range(where[Where.COLUMNS]):  # how the time of a last event moves, for `finish`
+    for j in range(where[Where.COLUMNS]):  # the shifts of the last event, for `finish`
         put(m, at[LanePart.AFTER_POSITION] + j, lane, state[State.COORDINATES + 2 * rows + j])
     chatter = where[Where.MODE] == Mode.CHATTER
     lanes[LaneArray.NUMBERS][lane, LaneNumber.CHATTER_SPEED] = state[State.CHATTER_SPEED] if chatter else 0.0

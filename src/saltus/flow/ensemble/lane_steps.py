@@ -1,4 +1,4 @@
-"""One step of a group of lanes: how long it may be, whether it meets the contact, and when.
+"""One step of a group of lanes: its length, the roots of the gap within it, and the new state.
 
 Its compiled part goes into one module with that of `driver.py`.
 """
@@ -36,9 +36,9 @@ from saltus.taylor import (
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
 ZERO_TERM = 1e-300
-LAST_TERMS = 4  # of a series, the largest of which limits the step: two may nearly vanish together
-LOG_GAP = 0.35 * math.log2(math.e)  # for GAP: where four terms vanish, so do others
-NEARLY = 1e-5  # of the time, and of the slope: a shorter move leads to the root to rounding, and its cube is rounding
+LAST_TERMS = 4  # the largest of so many last terms of a series limits the step: two of them may nearly vanish together
+LOG_GAP = 0.35 * math.log2(math.e)  # like `kernel_layout.GAP`, but for the last four terms: if these vanish, so do others
+NEARLY = 1e-5  # of the time, and of the slope: after a shorter move the root is exact to rounding, as its cube is rounding
 
 
 @lean_jit
@@ -49,10 +49,10 @@ def row_count(at):
 
 @lean_jit
 def step_limits(order, tol):
-    """log2 of tol; log2 of how much longer than the step its upper half would allow where it vanishes, and that factor; one over
-    the orders of the last terms.
+    """Constants of `row_step`: log2 of tol; log2 of the factor by which the step from the last terms may exceed the one from the
+    upper half of a series, and this factor; and one over the orders of the last terms.
 
-    Taken once for a run: a call of the C library in every step would put all registers into memory.
+    They are computed once for a run, because a call of the C library in every step would put all registers into memory.
     """
     log_tol = math.log2(tol)
     rarely = -log_tol / order - LOG_GAP
@@ -72,9 +72,9 @@ def state_size(m, at, sizes):
 
 @inline_jit
 def natural_step(m, at, sizes, limits, size):
-    """The step that every row's series allows, those of the tangent's columns included, relative to the size of the state.
+    """The step that the series of all rows allow, including those of the tangent's columns, relative to the size of the state.
 
-    `limits` are `step_limits` of the rows, and of the columns.
+    `limits` are the `step_limits` of the rows and of the columns.
     """
     rows = sizes[Size.OWN]
     step = row_step(m, at[LanePart.VELOCITIES], sizes[Size.ORDER], size, limits[0])
@@ -103,7 +103,7 @@ def column_step(m, at, sizes, first, limits):
 def row_step(m, series, order, size, limits):
     """The step at which the largest of a series' last terms is tol, relative to `size`.
 
-    Where they vanish its upper half says how fast it grows, as in `steps.step_size`.
+    If the last terms vanish, the growth of the series is taken from all terms of its upper half, as in `steps.step_size`.
     """
     log_tol, rarely, factor, inverses = limits
     wanted = log_tol + rough_log2(size)
@@ -125,7 +125,7 @@ def row_step(m, series, order, size, limits):
 
 @lean_jit
 def upper_half(m, series, order, log_size, log_tol):
-    """log2 of the step that the upper half of a series allows, its last terms left out."""
+    """log2 of the step that the upper half of a series allows, without its last terms."""
     step = splat(500.0)
     for k in range(order // 2, order - LAST_TERMS + 1):
         growth = (rough_log2(maximum(splat(ZERO_TERM), absolute(load(m, series + k)))) - log_size) * (1.0 / k)
@@ -135,9 +135,10 @@ def upper_half(m, series, order, log_size, log_tol):
 
 @inline_jit
 def sweep(m, at, row, order, start, h):
-    """Position from `start` on, velocity and acceleration at h of a coordinate, and B = h^2 sum_{j>=2} abs(a_j) h^j.
+    """Position (with `start` as its value at 0), velocity and acceleration of a coordinate at h, and B = h^2 sum_{j>=2} abs(a_j)
+    h^j.
 
-    B bounds how far the second derivative in u = t/h strays from that of the cubic q_0 + ... + q_3 h^3 u^3.
+    B bounds the difference between the second derivative in u = t/h and that of the cubic q_0 + ... + q_3 h^3 u^3.
     """
     before = row * SERIES_LENGTH
     positions, velocities = at[LanePart.POSITIONS] + before, at[LanePart.VELOCITIES] + before
@@ -156,7 +157,7 @@ def sweep(m, at, row, order, start, h):
 
 @inline_jit
 def motion_at(m, at, row, order, start, h):
-    """Position from `start` on, velocity, acceleration, and half its rate of change of a coordinate, at h."""
+    """Position (with `start` as its value at 0), velocity, acceleration, and half the acceleration's rate of change, at h."""
     positions, velocities = at[LanePart.POSITIONS] + row * SERIES_LENGTH, at[LanePart.VELOCITIES] + row * SERIES_LENGTH
     x, v, a, jerk = load(m, positions + order), load(m, velocities + order), splat(0.0), splat(0.0)
     for k in range(order - 1, 0, -1):
@@ -168,7 +169,8 @@ def motion_at(m, at, row, order, start, h):
 
 @inline_jit
 def both_at(m, positions, velocities, order, start, h):
-    """Position from `start` on and velocity at h, even and odd powers apart so that the processor works on four sums at once."""
+    """Position (with `start` as its value at 0) and velocity at h. Even and odd powers are summed apart, so that the processor
+    works on four sums at once."""
     square = h * h
     top = order - (order & 1)
     x, v = load(m, positions + top), load(m, velocities + top)
@@ -185,10 +187,12 @@ def both_at(m, positions, velocities, order, start, h):
 
 @inline_jit
 def shape(cubic, bend, skip):
-    """What is certain of a gap p0 + p1 u + p2 u^2 + p3 u^3 + ..., u in [0, 1], beyond its cubic bounded by B (see `sweep`).
+    """Properties that a gap p0 + p1 u + p2 u^2 + p3 u^3 + ... certainly has for u in [0, 1], from its cubic and the bound B of
+    the other terms (see `sweep`).
 
-    Returns bits of the lanes in which it has no root (where `skip` is set: but the one at 0), in which it falls, and in which
-    it is concave, or convex; by the Bernstein coefficients of the cubic, of its derivative, or of the gap over u.
+    Returns bits of the lanes in which it has no root (apart from the one at 0 where `skip` is set), in which it falls, in which
+    it is concave, and in which it is convex; by the Bernstein coefficients of the cubic, of its derivatives, or of the gap over
+    u.
     """
     g0, g1, g2, g3 = cubic
     rest = bend * (1.0 / 12.0)
@@ -203,7 +207,7 @@ def shape(cubic, bend, skip):
 
 @inline_jit
 def root_move(value, inverse, second, third):
-    """By how much a root lies beyond an argument, from Taylor's coefficients there and the inverse of the slope: to O(move^4)."""
+    """The distance of a root from an argument, from the Taylor coefficients there and the inverse of the slope, to O(move^4)."""
     n, a, b = value * inverse, second * inverse, third * inverse
     return -n * fma(n, fma(n, fma(2.0 * a, a, -b), a), splat(1.0))
 
@@ -212,17 +216,18 @@ def root_move(value, inverse, second, third):
 def guess_from_end(cubic, end, sign, h):
     """The root in [0, h] of the sextic that has the gap's values and derivatives at both ends of a step.
 
-    Scaled to a step of 1: g0 + g1 u + g2 u^2 + g3 u^3 + ... at the start; f, its slope, and half its curvature `pull` at the end.
-    One move from the root of the parabola at the end, from which the root is counted back.
+    Scaled to a step of 1, the gap is g0 + g1 u + g2 u^2 + g3 u^3 + ... at the start; at the end it is f, with its slope and half
+    its curvature, `pull`. The root is one move (`root_move`) from the root of the parabola at the end; d is its distance from the
+    end.
     """
     f, slope, pull = sign * end[0], sign * end[1] * h, 0.5 * sign * end[2] * (h * h)
     g0, g1, g2, g3 = cubic
-    a, b, c = g0 - f + slope - pull, g1 - slope + 2.0 * pull, g2 - pull  # what the parabola lacks at the start
+    a, b, c = g0 - f + slope - pull, g1 - slope + 2.0 * pull, g2 - pull  # the difference from the parabola at the start
     c3, c4 = 20.0 * a + 10.0 * b + 4.0 * c + g3, -45.0 * a - 25.0 * b - 11.0 * c - 3.0 * g3
     c5, c6 = 36.0 * a + 21.0 * b + 10.0 * c + 3.0 * g3, -10.0 * a - 6.0 * b - 3.0 * c - g3
     square = maximum(fma(slope, slope, -4.0 * f * pull), splat(0.0))
     d = minimum(2.0 * f * rough_inverse(slope - rough_root(square)), splat(1.0))
-    p1 = fma(c6, d, c5)  # Horner's rule, and again on what it leaves behind
+    p1 = fma(c6, d, c5)  # Horner's rule, repeated for the derivatives
     p2 = fma(p1, d, c4)
     p3 = fma(p2, d, c3)
     p4 = fma(p3, d, pull)
@@ -241,10 +246,10 @@ def guess_from_end(cubic, end, sign, h):
 
 @inline_jit
 def only_root(m, at, row, order, start, sign, guess, high, chosen):
-    """The root in (0, high] of gaps that have one there, not negative at 0 (if zero, then growing) and negative at `high`.
+    """The root in (0, high] of gaps that have exactly one there: not negative at 0 (if zero, then growing), negative at `high`.
 
-    Moves as in `root_move` from a guess, with bisection where one leaves the bracket; `sign` is 1 or -1. A lane stays where
-    it has converged, whatever the others do. Returns the root and the velocity there.
+    The search repeats `root_move` from a guess, with bisection if a move leaves the bracket; `sign` is 1 or -1. A lane that has
+    converged is not changed any more, whatever the others do. Returns the root and the velocity there.
     """
     low, speed, active = splat(0.0), splat(0.0), chosen
     tau = select(mask(bits(guess > 0.0) & bits(guess <= high)), guess, 0.5 * high)  # the guess may have gone astray
@@ -277,7 +282,7 @@ def lane_value(m, series, order, lane, t):
 
 @lean_jit
 def margins_certain(m, at, sizes, h):
-    """Bits of the lanes in which every margin stays positive over the step for certain."""
+    """Bits of the lanes in which every margin certainly stays positive over the step."""
     sure = ALL
     for stop in range(sizes[Size.MARGINS]):
         series = at[LanePart.MARGINS] + stop * SERIES_LENGTH
@@ -290,7 +295,7 @@ def margins_certain(m, at, sizes, h):
 
 @lean_jit
 def series_true(code, m, at, sizes, tol, h, size):
-    """Bits of the lanes whose series at the end of the step gives the acceleration that the model has there.
+    """Bits of the lanes whose series give, at the end of the step, the acceleration that the model has there.
 
     The new state must be in place. See `steps.leaps`.
     """
@@ -306,15 +311,15 @@ def series_true(code, m, at, sizes, tol, h, size):
 
 @inline_jit
 def commit(at, m, moved, hit, speed):
-    """Make the new state of the lanes in `moved` their state, and what is after an impact that of those in `hit`.
+    """Make the new state the state of the lanes in `moved`, and the state after the impact that of the lanes in `hit`.
 
-    `speed` is that of the impacts.
+    `speed` is the speed of the impacts.
     """
     going, impact = mask(moved), mask(hit)
     replace(m, Slot.NOW, going, load(m, Slot.NEW_TIME))
     replace(m, Slot.SIDE, impact, load(m, Slot.NEW_SIDE))
     replace(m, Slot.LEAST_SPEED, impact, minimum(load(m, Slot.LEAST_SPEED), speed))
     replace(m, Slot.IMPACTS, impact, load(m, Slot.IMPACTS) + 1.0)
-    for row in range(2 * row_count(at)):  # positions, then velocities, lie one behind the other
+    for row in range(2 * row_count(at)):  # the slots of velocities follow those of positions
         new = select(impact, load(m, at[LanePart.AFTER_POSITION] + row), load(m, at[LanePart.NEW_POSITION] + row))
         replace(m, at[LanePart.POSITION] + row, going, new)

@@ -1,4 +1,4 @@
-"""Whether the lanes meet a contact within a step, and when.
+"""The roots of the gap in all lanes within a step: in which lanes a contact is met, and when.
 
 Its compiled part goes into one module with that of `driver.py`.
 """
@@ -15,11 +15,12 @@ from saltus.taylor import WIDTH, bits, fma, inline_jit, load, mask, maximum, rou
 
 @inline_jit
 def meet(at, row, m, order, h, sign, start, end, bend, skip, alive, patient, helpers, space):
-    """Which of the lanes in `alive` meet a contact within the step, which are in doubt, which wait, when, and with what velocity.
+    """The lanes in `alive` that meet a contact within the step, those in doubt, and those that wait for a shorter step; the
+    times, and the velocities at these times.
 
-    The contact is met where `sign` times a coordinate falls to 0. `start` is the coordinate from the contact on at the start of
-    the step, `end` position, velocity and acceleration at its end. `skip` are the lanes in which the step starts at the contact,
-    `patient` those that wait for a shorter step where nothing is certain.
+    The contact is met where `sign` times a coordinate, measured from the contact, falls to 0. `start` is this coordinate at the
+    start of the step, `end` its position, velocity and acceleration at the end. `skip` are the lanes whose step starts at the
+    contact; `patient` are those that may wait for a shorter step if nothing is certain.
     """
     x, v, _ = end
     g0, first = sign * start, at[LanePart.POSITIONS] + row * SERIES_LENGTH
@@ -60,10 +61,12 @@ def meet(at, row, m, order, h, sign, start, end, bend, skip, alive, patient, hel
 
 @inline_jit
 def short_flight(cubic, bend):
-    """Which flights from the contact end for certain within twice the time that they take under the pull at their start.
+    """The lanes in which a flight from the contact certainly ends within twice the time that it would take if the acceleration
+    stayed as at its start.
 
-    By the cubic and the bound of `shape`, on that part of the step alone: the pull may turn round later in it. Returns bits of
-    the lanes in which the gap is concave up to there and negative there, and half of that time as a share of the step.
+    Only this part of the step is considered, by the cubic and the bound of `shape`: later in the step the acceleration may change
+    its sign. Returns bits of the lanes in which the gap is concave up to this time and negative then, and half of the time as a
+    share of the step.
     """
     _, g1, g2, g3 = cubic
     flight = -g1 * rough_inverse(g2)
@@ -76,9 +79,9 @@ def short_flight(cubic, bend):
 
 @inline_jit
 def guess_from_start(cubic, higher, flight):
-    """The end of a short flight, as a share of the step: a move from where it would end under the pull at its start.
+    """The end of a short flight, as a share of the step: one `root_move` from its end under the acceleration at its start.
 
-    `higher` are the terms of fourth and fifth order of the gap; those behind them are left out.
+    `higher` are the terms of fourth and fifth order of the gap; higher ones are neglected.
     """
     _, g1, g2, g3 = cubic
     g4, g5 = higher

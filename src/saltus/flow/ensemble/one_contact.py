@@ -1,6 +1,6 @@
-"""A step of all lanes of a model with one contact, or none: its smooth motion up to the contact, and impacts.
+"""A step of all lanes of a model with one contact or none: the smooth motion up to the contact, and impacts.
 
-Its compiled part goes into one module with that of `driver.py`; `several_contacts.py` stands in its place for other models.
+Its compiled part goes into one module with that of `driver.py`; `several_contacts.py` takes its place for other models.
 """
 
 from __future__ import annotations
@@ -73,15 +73,16 @@ def begin_contact(lane, code, sizes, at, m, lanes, env, state, piece):
 
 @inline_jit
 def rate_on(m, slot):
-    """The gap's rate of change with the coordinate, on the side that a slot says."""
+    """The gap's rate of change with the coordinate, on the side that a slot holds."""
     return select(mask(bits(load(m, slot) > 0.0)), load(m, Slot.RATE_UP), load(m, Slot.RATE_DOWN))
 
 
 @inline_jit
 def propose(code, sizes, at, m, flags, settings, limits, helpers, space):
-    """The step of every lane up to its first contact, put at NEW_*.
+    """Compute the step of every lane up to its first contact, and put the new state into the slots NEW_*.
 
-    Returns (bits that hit, bits for the scalar kernel, bits that wait for a shorter step, h, tau, bend).
+    Returns bits of the lanes that hit, bits for the scalar kernel, and bits of the lanes that wait for a shorter step; the length
+    h of the step, the part tau of it that is taken, and the bound `bend` of `sweep`.
     """
     order = sizes[Size.ORDER]
     code[Code.SERIES](m, order)
@@ -93,13 +94,13 @@ def propose(code, sizes, at, m, flags, settings, limits, helpers, space):
     alive = flags[Flag.BUSY] & ~flags[Flag.SCALAR]
     sound = bits(natural > settings[LaneSetting.SHORTEST_STEP]) & bits(size < FAST)
     contact = load(m, Slot.CONTACT)
-    start = load(m, at[LanePart.POSITION]) - contact  # near the contact the gap keeps its digits
+    start = load(m, at[LanePart.POSITION]) - contact  # measured from the contact, so that a small gap keeps its digits
     x, v, a, bend = sweep(m, at, 0, order, start, h)
     if sizes[Size.MARGINS] > 0:
         sound &= margins_certain(m, at, sizes, h)
     hit, waits, tau, at_root = 0, 0, h, v
     if sizes[Size.SIDES] > 0:
-        sign = select(mask(bits(rate_on(m, Slot.SIDE) > 0.0)), splat(1.0), splat(-1.0))  # all that a root depends on
+        sign = select(mask(bits(rate_on(m, Slot.SIDE) > 0.0)), splat(1.0), splat(-1.0))  # a root depends on these numbers alone
         end, skip = (x, v, a), flags[Flag.AT_CONTACT]
         patient = bits(share > SMALLEST_SHARE)
         hit, doubtful, waits, tau, at_root = meet(
@@ -123,7 +124,8 @@ def propose(code, sizes, at, m, flags, settings, limits, helpers, space):
 
 @inline_jit
 def reset(code, at, m, settings, hit):
-    """Impacts at the new state. Returns (bits that are resolved, bits for the scalar kernel, bits that are captured)."""
+    """Apply the reset at the new state. Returns bits of the lanes that are resolved, bits for the scalar kernel, and bits of
+    those that are captured."""
     code[Code.IMPACT](m)
     approach = rate_on(m, Slot.SIDE) * load(m, at[LanePart.NEW_VELOCITY])
     speed = rate_on(m, Slot.NEW_SIDE) * load(m, at[LanePart.AFTER_VELOCITY])
@@ -137,9 +139,9 @@ def reset(code, at, m, settings, hit):
 
 @lean_jit
 def loses_nothing(code, at, m, speed):
-    """Bits of the lanes in which the next two impacts would leave the gap its `speed`: nothing accumulates there.
+    """Bits of the lanes in which the next two impacts would not change the gap's `speed`, so that impacts do not accumulate.
 
-    `contact.accumulation` asks the same of the scalar kernel's motions.
+    `contact.accumulation` tests the same in the scalar kernel.
     """
     side, before = load(m, Slot.SIDE), load(m, at[LanePart.NEW_VELOCITY])
     for _ in range(2):

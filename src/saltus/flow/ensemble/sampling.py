@@ -1,4 +1,4 @@
-"""What is recorded of a trajectory: extrema of its coordinates, the ends of its forcing periods, whether it repeats itself.
+"""The records of a trajectory: extrema of its coordinates, the ends of its forcing periods, and its recurrence.
 
 Its compiled part goes into one module with that of `driver.py`.
 """
@@ -32,17 +32,17 @@ from saltus.taylor import (
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
-LONGEST_RECURRENCE = 16  # forcing periods, up to which a recurrence is looked for
+LONGEST_RECURRENCE = 16  # the longest period for which a recurrence is looked for, in forcing periods
 RECURRENT = 1e-10  # largest distance of two states, relative to their size or to 1, at which they count as one
-NEARLY_RECURRENT = 1e4  # largest distance, in units of RECURRENT, at which they may still be approaching one another
-ROUNDED = 1e-14  # of what is bounded: more than rounding takes from a difference of two bounds
-NEARLY_TURNED = 1e-4  # of a span of time: the fourth power of a shorter move to a turning point is rounding
-MOST_MOVES = 60  # steps of Newton's method to a turning point: more than bisection needs for the same digits
+NEARLY_RECURRENT = 1e4  # largest distance, in units of RECURRENT, at which two states may still approach one another
+ROUNDED = 1e-14  # share of a bound that covers the rounding of a difference of two bounds
+NEARLY_TURNED = 1e-4  # share of a span of time: the fourth power of a shorter move to a turning point is rounding
+MOST_MOVES = 60  # steps of Newton's method to a turning point: more than bisection would need
 
 
 @lean_jit
 def turning_value(m, at, row, order, low, high, v_low, v_high, chosen):
-    """The position where a velocity, monotonic and of two signs at the ends, vanishes."""
+    """The position at which the velocity vanishes, if it is monotonic and has different signs at the ends."""
     span, tau = high - low, low + (high - low) * (v_low / (v_low - v_high))
     before = row * SERIES_LENGTH
     active, start, value = chosen, load(m, at[LanePart.POSITIONS] + before), splat(0.0)
@@ -65,10 +65,10 @@ def turning_value(m, at, row, order, low, high, v_low, v_high, chosen):
 
 @inline_jit
 def course(m, at, row, end, ratio, bend):
-    """What is certain of a coordinate on [0, end] by the first six terms of its series, and by how much the others may add.
+    """Properties that a coordinate certainly has on [0, end], from the first six terms of its series and a bound of the others.
 
-    `bend` is the bound of `sweep` for a step of end / `ratio`. Returns bits of the lanes in which the velocity is monotonic, and
-    in which it keeps its sign, and bounds of the coordinate, by the Bernstein coefficients of velocity and coordinate.
+    `bend` is the bound of `sweep` for a step of end / `ratio`. Returns bits of the lanes in which the velocity is monotonic, bits
+    of those in which it keeps its sign, and upper and lower bounds of the coordinate, all by Bernstein coefficients.
     """
     series, square = at[LanePart.POSITIONS] + row * SERIES_LENGTH, end * end
     cube = square * end
@@ -96,11 +96,11 @@ def course(m, at, row, end, ratio, bend):
 
 @lean_jit
 def record_range(m, at, row, sizes, h, bend, begin, v_begin, end, x, v, chosen, helpers, poly, series):
-    """Take the extrema of a coordinate from `begin` to `end` of this step into HIGHEST and LOWEST, for chosen lanes.
+    """Update HIGHEST and LOWEST with the extrema of a coordinate from `begin` to `end` of this step, in chosen lanes.
 
-    Lanes are left alone in forcing periods that are not recorded, and those whose coordinate does not pass what has been recorded
-    for certain. Where the velocity is monotonic for certain, an extremum within the step is where it vanishes. Where neither that
-    is certain nor that the velocity keeps its sign, all turning points are looked for, lane by lane.
+    Lanes are skipped in forcing periods that are not recorded, and if the coordinate certainly stays between the recorded values.
+    If the velocity is certainly monotonic, the extremum within the step is where it vanishes. If it is neither certainly
+    monotonic nor certainly of one sign, all turning points are looked for, lane by lane.
     """
     chosen &= bits(load(m, Slot.PERIOD) >= load(m, Slot.RECORDED_FROM))
     if chosen == 0:
@@ -130,7 +130,8 @@ def record_range(m, at, row, sizes, h, bend, begin, v_begin, end, x, v, chosen, 
 
 @lean_jit
 def record_others(m, at, sizes, h, past, end, chosen, helpers, poly, series):
-    """`record_range` of all coordinates but the first, up to the new state; in lanes `past` a period's end, from there on."""
+    """`record_range` for all coordinates but the first, up to the new state; in lanes `past` the end of a period, from this
+    end."""
     since, order = load(m, Slot.PERIOD_END) - load(m, Slot.NOW), sizes[Size.ORDER]
     for row in range(1, sizes[Size.OWN]):
         _, _, _, bend = sweep(m, at, row, order, load(m, at[LanePart.POSITION] + row), h)
@@ -144,8 +145,8 @@ def record_others(m, at, sizes, h, past, end, chosen, helpers, poly, series):
 def pass_ends(m, at, sizes, h, bend, past, helpers, poly, series):
     """End the forcing period in lanes whose step goes past its end: keep its records and begin new ones.
 
-    The state at the end is what the step's series give there. `forcing_periods.end_here` does the same for one lane that stands
-    at the end.
+    The state at the end is evaluated from the step's series. `forcing_periods.end_here` does the same for one lane whose state is
+    at the end of the period.
     """
     order, since = sizes[Size.ORDER], load(m, Slot.PERIOD_END) - load(m, Slot.NOW)
     chosen = mask(past)
@@ -192,11 +193,12 @@ def keep_ended(m, at, sizes, past):
 
 @lean_jit
 def recurrence_period(states, agreements, done, own):
-    """After how many forcing periods a trajectory repeats itself, or 0; and whether its last state agrees with an earlier one.
+    """The period of a trajectory that repeats itself, in forcing periods, or 0; and whether its last state agrees with an earlier
+    one.
 
-    `states` holds its last stroboscopic states. It repeats itself after q periods when 2 q + 2 states in a row agree with those q
-    periods before. The smallest q counts, and none while the states of a part of it are not clearly apart, as a recurrence of
-    fewer periods may still be approached.
+    `states` holds its last stroboscopic states. It repeats itself with the period q if 2 q + 2 states in a row agree with those q
+    forcing periods before; the smallest such q counts. As long as states a divisor of q apart are still near to one another, 0 is
+    returned, because the trajectory may be approaching a recurrence with this shorter period.
     """
     here, found, near, agrees = states[done % (2 * LONGEST_RECURRENCE)], 0, 0, False
     for q in range(1, min(LONGEST_RECURRENCE, done - 1) + 1):

@@ -1,7 +1,7 @@
-"""What a lane cannot decide together with the others, decided with the scalar kernel's search for roots.
+"""Roots and extrema of a single lane, where the bounds for all lanes leave them open, by the scalar kernel's search for roots.
 
-This text is compiled by itself, and called through pointers: linked into every function above it, it would be compiled again
-with each of them.
+This file is compiled by itself and called through pointers: if it were linked into its callers, it would be compiled again with
+each of them.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from saltus.taylor import cached_jit, get, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
-MOST_TURNS = 16  # turning points within one step that are looked for
+MOST_TURNS = 16  # the most turning points that are looked for within one step
 
 
 @cached_jit(LANE_ROOT)
@@ -43,7 +43,7 @@ def shift_start(p, n, u):
 
 @cached_jit(TURNING_RANGE)
 def turning_range(q, order, begin, h, p):
-    """The largest and the smallest value of a series on (begin, h]: at its end, or where its derivative vanishes between."""
+    """The largest and the smallest value of a series on (begin, h], at its end or where its derivative vanishes before."""
     high = low = horner(q, order, h)
     n, power = order - 1, 1.0
     for k in range(order):

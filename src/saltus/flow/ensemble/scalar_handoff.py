@@ -1,4 +1,4 @@
-"""A lane in the scalar kernel, for whatever is rare: rest, slow impacts that may accumulate, touches, limits.
+"""The scalar kernel as it moves one lane through rare events: rest, slow impacts that may accumulate, touches, limits.
 
 Its compiled part goes into one module with that of `lane_state.py`; the driver calls it through a pointer.
 """
@@ -33,7 +33,7 @@ def record_events(lane, where, m, lanes, events):
 
 @lean_jit
 def is_captured(where, state, geometry, threshold):
-    """Whether it is at rest, or at the contact with a speed of the gap below the one that is proved to be captured."""
+    """Whether a motion is proved to be captured: at rest, or at the contact with a speed of the gap below the threshold."""
     if where[Where.MODE] == Mode.REST:
         return threshold > 0.0
     if where[Where.MODE] == Mode.CHATTER:

@@ -1,9 +1,9 @@
-"""A step of all lanes of a model with several contacts: its smooth motion up to the first closing of a gap, and impacts.
+"""A step of all lanes of a model with several contacts: the smooth motion up to the first closing of a gap, and impacts.
 
 Its compiled part goes into one module with that of `driver.py`, in the place of `one_contact.py`, and with those of
-`contact_steps.py` and `lane_impacts.py`. A lane goes on by itself while the contacts that are closed certainly push and one gap
-at most closes. Releases, contacts that close together, slow impacts and rest are left to the scalar kernel, and so is every
-event of a motion with a tangent. All of a motion with frictions is.
+`contact_steps.py` and `lane_impacts.py`. Lanes move together as long as all closed contacts certainly push and at most one gap
+closes. Releases, contacts that close together, slow impacts and rest are left to the scalar kernel, and so are all events of
+motions with a tangent. The scalar kernel does all steps of motions with frictions.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from saltus.taylor import (
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
 
-COST_OF_SEVERAL = 3  # How much longer a step takes with the series of all coordinates than with that of one.
+COST_OF_SEVERAL = 3  # The time of a step with the series of all coordinates, in units of that with the series of one.
 
 
 @jit
@@ -73,7 +73,7 @@ def lane_space(sizes, at):
 
 @lean_jit
 def begin_contact(lane, code, sizes, at, m, lanes, env, state, piece):
-    """Tell a lane where its contacts are; returns the mode in which a motion begins, and 1 and the bits of closed contacts."""
+    """Tell a lane where its contacts are; returns the mode in which a motion begins, and 1 plus the bits of closed contacts."""
     own, count = sizes[Size.OWN], sizes[Size.CONTACTS]
     solved, contacts = lanes[LaneArray.GEOMETRY][lane], lanes[LaneArray.CONTACTS][lane]
     code[Code.GEOMETRY](env, piece, m, solved)  # any state will do: positions depend on parameters alone
@@ -104,10 +104,11 @@ def begin_contact(lane, code, sizes, at, m, lanes, env, state, piece):
 
 @inline_jit
 def step_all(code, scalar, sizes, at, m, flags, settings, limits, helpers, lanes, jobs, tables, space):
-    """A step of all lanes in which one coordinate is free, or of all others: of those of which more move for what it costs.
+    """One step, either of all lanes in which exactly one coordinate is free, or of all other lanes: of those that are more
+    numerous relative to the cost of their step.
 
-    Which these are changes no motion, as the others wait. Returns bits for the scalar kernel, bits captured, and bits past the
-    end of their forcing period.
+    The choice changes no motion, as the other lanes only wait. Returns bits for the scalar kernel, bits captured, and bits past
+    the end of their forcing period.
     """
     alive, one = flags[Flag.BUSY] & ~flags[Flag.SCALAR], False
     if sizes[Size.ONE_FREE] > 0:
@@ -120,7 +121,7 @@ def step_all(code, scalar, sizes, at, m, flags, settings, limits, helpers, lanes
         hit, sound, h, tau, bend, which = free_step(code, sizes, at, m, settings, limits, alive, helpers, space)
     hit &= sound & alive
     resolved, moved, waiting = 0, alive & sound & ~hit, 0
-    if hit and sizes[Size.COLUMNS] == 0:  # what becomes of a tangent is left to the scalar kernel
+    if hit and sizes[Size.COLUMNS] == 0:  # impacts with a tangent are left to the scalar kernel
         resolved = resolve_impacts(code, sizes, at, m, settings, hit, which)
         waiting = hit & ~resolved
     while waiting:
@@ -145,10 +146,10 @@ def step_all(code, scalar, sizes, at, m, flags, settings, limits, helpers, lanes
 
 @inline_jit
 def record_step(m, at, sizes, one, h, bend, tau, which, past, moved, helpers, space):
-    """Take the extrema of all coordinates up to the new state; in lanes `past` a period's end, from there on."""
+    """Record the extrema of all coordinates up to the new state; in lanes `past` the end of a period, from this end."""
     after, positions, velocities = mask(past), at[LanePart.NEW_POSITION], at[LanePart.NEW_VELOCITY]
     begin = select(after, load(m, Slot.PERIOD_END) - load(m, Slot.NOW), splat(0.0))
-    if one:  # those that are held stay where they are, and the records of the period begin there
+    if one:  # held coordinates are constant, and the records of the period begin with them
         v_begin = select(after, of_free(m, sizes, at[LanePart.ENDED_VELOCITY], which), load(m, Slot.FREE_VELOCITY))
         x, v = of_free(m, sizes, positions, which), of_free(m, sizes, velocities, which)
         record_range(m, at, 0, sizes, h, bend, begin, v_begin, tau, x, v, moved, helpers, space[0], space[1])

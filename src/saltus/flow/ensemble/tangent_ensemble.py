@@ -1,4 +1,4 @@
-"""Ensembles of motions with the derivatives of their states beside them, advanced in spans of time."""
+"""Ensembles of motions with the derivatives to their initial states, advanced in spans of time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Run many trajectories on all cores: chunks of jobs, handed to threads that work without Python's lock."""
+"""Many trajectories on all cores: chunks of jobs are handed to threads that release Python's lock."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ WHAT = "following the motions"  # for the progress
 
 @dataclass(frozen=True)
 class ThreadSettings:
-    """How trajectories are shared between threads, and how often these are looked after."""
+    """How trajectories are shared between threads, and how often threads are checked."""
 
-    # Trajectories that one call of the driver runs at most, and of how many forcing periods it keeps something in all: 25 MB for
-    # one coordinate. At the end of a chunk lanes stand empty, for long where few motions have a thousand times the impacts of
-    # others.
+    # The largest number of trajectories in one call of the driver, and of samples that it keeps in all: 25 MB for one coordinate.
+    # Chunks are large because lanes stand empty at the end of each one; for long, if a few motions have a thousand times the
+    # impacts of the others.
     largest_chunk: int = 8192
     most_samples: int = 1 << 19
-    # Trajectories of the smallest chunk, if there are as many for each thread.
+    # The smallest number of trajectories in a chunk, if there are as many for each thread.
     smallest_chunk: int = 8 * WIDTH
-    # Chunks that each thread still has before it, at least, when one is taken: the last ones are small, so that all threads end
-    # at about the same time.
+    # When a chunk is taken, at least so many chunks of its size remain for each thread: the last ones are small, so that all
+    # threads end at about the same time.
     chunks_ahead: int = 2
     look_interval: float = 0.1  # Seconds between looks at Ctrl-C and at the progress.
 
@@ -44,9 +44,9 @@ SETTINGS = ThreadSettings()
 
 
 def chunks(count: int, threads: int, kept: int = 1) -> Iterator[slice]:
-    """The chunks of so many trajectories: large ones, then ever smaller ones, so that no thread is left alone at the end.
+    """The chunks of `count` trajectories: large ones first, then smaller ones, so that all threads end at about the same time.
 
-    Of each trajectory something of so many forcing periods is kept.
+    `kept` is the number of forcing periods for which samples of each trajectory are kept.
     """
     first, least = 0, min(SETTINGS.smallest_chunk, math.ceil(count / threads))
     largest = min(SETTINGS.largest_chunk, max(least, SETTINGS.most_samples // kept))
@@ -90,22 +90,22 @@ _sharing: list[Callable[[], int]] = [lambda: 1]  # how many processes share the 
 
 
 def share_cores(processes: Callable[[], int]) -> None:
-    """Let this process use its share of the cores, where so many processes compute at the time.
+    """Let this process use only its share of the cores, as other processes compute at the same time; `processes` counts them.
 
-    Threads beyond the cores only divide the lanes of small ensembles, of which more then stand empty at the end.
+    More threads than cores would only split small ensembles further, and more lanes would stand empty at the end.
     """
     _sharing[:] = [processes]
 
 
 def available_cores() -> int:
-    """The cores that this process may use, its share of them where it has one (`share_cores`)."""
+    """The number of cores that this process may use, or its share of them (`share_cores`)."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return max(1, cores // max(1, _sharing[0]()))
 
 
 @dataclass(frozen=True)
 class Lanes:
-    """A structure ready to run in lanes, with what is the same for all of its trajectories."""
+    """A structure ready to run in lanes, with the settings that are the same for all of its trajectories."""
 
     program: Program
     slots: Slots
@@ -113,13 +113,13 @@ class Lanes:
     parameters: np.ndarray  # of the system; `Jobs.columns` replaces some
     tol: float
     kept: int  # how many of the last forcing periods are kept
-    sampled: list[int]  # which columns of a sample are
-    extrema: bool  # whether they are recorded
-    from_start: bool  # from the start of a motion, not only in the forcing periods that are kept
+    sampled: list[int]  # which columns of a sample are kept
+    extrema: bool  # whether extrema are recorded
+    from_start: bool  # whether from the start of a motion, not only in the forcing periods that are kept
     settle: bool  # whether a trajectory ends when it repeats itself
 
     def run(self, jobs: Jobs, threads: int, progress: Progress = silent, total: float = 0.0) -> Ends:
-        """Run all jobs; `total` is how many forcing periods they are, for the progress.
+        """Run all jobs; `total` is the number of their forcing periods, for the progress.
 
         Raises
         ------
@@ -127,7 +127,7 @@ class Lanes:
             After Ctrl-C, within a step of every lane.
         """
         n, own = len(jobs), self.own
-        threads = max(1, min(threads, math.ceil(n / WIDTH)))  # a thread without lanes takes its time to begin, too
+        threads = max(1, min(threads, math.ceil(n / WIDTH)))  # starting a thread costs time even if it has no lanes
         ends = Ends(
             np.empty((n, jobs.states.shape[1])),
             np.zeros((n, EndNumber.RATES + own + self.program.structure.module.COLUMNS)),
@@ -189,7 +189,7 @@ class Lanes:
         ends.samples[rows] = samples[:, :, self.sampled]
 
     def _arguments(self) -> tuple[Any, ...]:
-        """What every call of the driver is given: functions, sizes, places and settings."""
+        """The arguments that are the same in every call of the driver: functions, sizes, places and settings."""
         structure, trace = self.program.structure, self.program.trace
         module, scalar = structure.module, self.program.model if self.several else structure.functions
         code = (*self.functions[:3], *structure.tables, *self.functions[3:])
@@ -223,7 +223,7 @@ class Lanes:
         return code, (load_advance(self.several), scalar), load_helpers(self.several), sizes, places, settings
 
     def _memory(self) -> np.ndarray:
-        """The lanes' memory; vectors lie within one line of the cache each, or every load would touch two."""
+        """The lanes' memory, aligned such that each vector lies within one cache line; otherwise every load would touch two."""
         size, line = self.slots.end * WIDTH, CACHE_LINE // 8
         buffer = np.zeros(size + line)
         start = -(buffer.ctypes.data // 8) % line
@@ -231,9 +231,9 @@ class Lanes:
 
 
 def lane_order(tol: float) -> int:
-    """The order that pays in lanes: 14 at 1e-6, 18 at 1e-10, 22 at 1e-14; always even (see `memory_layout.py`).
+    """The order of series in lanes: 14 at 1e-6, 18 at 1e-10, 22 at 1e-14; always even (see `memory_layout.py`).
 
-    Two more take up to 5 % less time, but where the last coefficients nearly vanish the step is too long by a factor, and the
-    error by that factor to the power of the order.
+    An order higher by two takes up to 5 % less time. But if the last coefficients nearly vanish, a step is too long by some
+    factor, and the error too large by this factor to the power of the order.
     """
     return 2 * math.ceil((7 - math.log10(tol)) / 2 - 1e-9)

@@ -1,4 +1,4 @@
-"""What an ensemble is asked for besides its states and parameters."""
+"""The results that are asked of an ensemble: tolerance, duration, samples, and early ends."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from saltus.flow.ensemble.threads import available_cores
 
 
 class Sample(StrEnum):
-    """What may be kept of each of the last forcing periods; the order is that of the variables in the result."""
+    """The samples that may be kept for each of the last forcing periods; their order is that of the variables in the result."""
 
     STATE = "state"  # at the end of the period, stroboscopically
-    EXTREMA = "extrema"  # of the coordinate, or of all of several
+    EXTREMA = "extrema"  # of the coordinate; with several coordinates, of any of them
     SPEED = "speed"  # the least abs(v-) of the impacts
     IMPACT_COUNT = "impact_count"
 
     def columns(self, own: int) -> list[int]:
-        """Its columns of what the driver samples, for so many coordinates of the model."""
+        """Its columns in the samples of the driver, for a model with `own` coordinates."""
         state = 2 * own
         return {
             Sample.STATE: list(range(state)),
@@ -34,7 +34,7 @@ class Sample(StrEnum):
 
 
 class Until(StrEnum):
-    """What may end a trajectory before its time."""
+    """The conditions that may end a trajectory early."""
 
     REST = "rest"  # it is proved to be captured at rest for all later loads (see `capture_speed`)
     SETTLED = "settled"  # it repeats itself every q <= 16 forcing periods
@@ -42,10 +42,10 @@ class Until(StrEnum):
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is to be computed: how exactly, how long, and what is kept of it."""
+    """What is to be computed: how exactly, for how long, and which samples are kept."""
 
     tol: float
-    periods: float | None  # None where a duration is asked for
+    periods: float | None  # None if a duration is asked for
     limits: tuple[str, ...]  # margins to stop at
     sample: tuple[str, ...] = ()  # of `Sample`
     until: tuple[str, ...] = ()  # of `Until`
@@ -54,12 +54,12 @@ class Wanted:
 
 
 def read_names(argument: str, given: Any, known: Iterable[str] | None = None) -> tuple[str, ...]:
-    """One name or several; each of the known ones, where these are given.
+    """One name or several as a tuple; each must be one of the `known` names, if these are given.
 
     Raises
     ------
     ParameterError
-        What is no name, or not known.
+        A value is no name, or no known one.
     """
     known = None if known is None else tuple(known)
     try:
@@ -75,12 +75,12 @@ def read_names(argument: str, given: Any, known: Iterable[str] | None = None) ->
 
 
 def read_last(last: Any, periods: int) -> int:
-    """Of how many of so many forcing periods something is kept.
+    """For how many of the forcing periods of a motion samples are kept.
 
     Raises
     ------
     ParameterError
-        No whole number from 1 on, and not "all".
+        `last` is neither a whole number from 1 on nor "all".
     """
     if isinstance(last, str) and last == "all":
         return periods
@@ -95,7 +95,7 @@ def read_side(side: Any) -> int:
     Raises
     ------
     ParameterError
-        Neither +1 nor -1 nor None.
+        `side` is neither +1 nor -1 nor None.
     """
     if side is not None and (np.ndim(side) or side not in (1, -1)):
         raise ParameterError(f"side must be +1 or -1, got {side!r}", "side")
@@ -103,12 +103,12 @@ def read_side(side: Any) -> int:
 
 
 def read_threads(threads: Any) -> int:
-    """How many threads to use, by default as many as there are cores.
+    """The number of threads to use, by default as many as there are cores.
 
     Raises
     ------
     ParameterError
-        No whole number from 1 on.
+        `threads` is no whole number from 1 on.
     """
     threads = available_cores() if threads is None else threads
     check_count("threads", threads, 1)
