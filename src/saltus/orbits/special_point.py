@@ -31,13 +31,13 @@ class SpecialKind(StrEnum):
     BPC = "BPC", "branch point: symmetry breaking, or a crossing of branches"
     NS = "NS", "Neimark-Sacker"
     GR = "GR", "grazing"
-    RL = "RL", "a release that the load only touches: the excursion after it shrinks to rest"
-    CH = "CH", "the impacts die away only at the instant of the next release: the rest before it has no duration"
+    RL = "RL", "a release at which the load just reaches what holds the contact closed: the excursion after it shrinks to rest"
+    CH = "CH", "the impacts die away just at the instant of the next release: the rest between them has no duration"
     SW = "SW", "switching: a contact's release, or its closing, appears or is lost"
-    GS = "GS", "grazing-sliding: what slides comes to the speed of its ground in passing, and sticks for a while beyond"
-    CS = "CS", "crossing-sliding: where the sliding direction turns over, a stick appears or is lost"
-    SS = "SS", "switching-sliding: before a stick the sliding direction turns over once more, or no more"
-    AS = "AS", "adding-sliding: within a stick a slip appears or is lost"
+    GS = "GS", "grazing-sliding: the sliding velocity touches 0; beyond, the mass sticks for a while"
+    CS = "CS", "crossing-sliding: at a reversal of the sliding direction a phase of sticking appears or is lost"
+    SS = "SS", "switching-sliding: before a phase of sticking a reversal of the sliding direction appears or is lost"
+    AS = "AS", "adding-sliding: within a phase of sticking a phase of sliding appears or is lost"
     CP = "CP", "cusp: two folds meet", 2
     GPD = "GPD", "degenerate period doubling: the doubled orbit changes the side on which it lies", 2
     DBPC = "DBPC", "degenerate symmetry breaking: the unsymmetric orbits change the side on which they lie", 2
@@ -82,15 +82,17 @@ class OrbitEnd(EndReason):
     MANY_IMPACTS = "more than {detail} impacts a period"
     ACCUMULATES = "grazings accumulate near {parameter:.9g}: {detail} impacts and more"
     REPELS = "the orbit repels too strongly to be followed: its largest multiplier is {detail}"
-    TWO_AT_ONCE = "contacts act at one instant, or a contact begins to bounce to rest: motions beside it have other equations"
+    TWO_AT_ONCE = (
+        "several contacts act at one instant, or the impacts at a contact begin to die away: motions beside it have other equations"
+    )
     NOT_UNIQUE = "an impact loses its speed while both sides push outward: the motion is not unique there"
     GRAZES_INTO_REST = "the orbit shrinks to rest"
-    NO_OTHER_EVENTS = "at {parameter:.10g} the events of the motion change, and no orbits with other events follow"
+    NO_OTHER_EVENTS = "at {parameter:.10g} the events of the motion change, and no orbits with other events continue the branch"
     NOT_CONTINUOUS = (
-        "at {parameter:.10g} an event appears or is lost at which motions part: those beside it end up {detail} apart"
+        "at {parameter:.10g} an event appears or is lost at which the motion is not continuous: neighbours end up {detail} apart"
     )
     NO_SECTION = "at {parameter:.10g} an event comes to the phase at which the state is given, and no other phase would do"
-    STICKS = "from {parameter:.10g} on what has slid sticks for good, as it may anywhere near"
+    STICKS = "from {parameter:.10g} on the mass sticks for good; it may then rest anywhere near that place"
     NO_MOTION = "the motion cannot be followed {detail} the grazing"
     NO_DIRECTION = "neither direction after the grazing leads to orbits of the system"
     MEETS_GRAZING = "meets another grazing: {kind}"
