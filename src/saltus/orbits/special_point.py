@@ -83,7 +83,7 @@ class OrbitEnd(EndReason):
     ACCUMULATES = "grazings accumulate near {parameter:.9g}: {detail} impacts and more"
     REPELS = "the orbit repels too strongly to be followed: its largest multiplier is {detail}"
     TWO_AT_ONCE = (
-        "several contacts act at one instant, or the impacts at a contact begin to die away: motions beside it have other equations"
+        "several contacts act at one instant, or impacts at a contact begin to die away: motions beside it have other equations"
     )
     NOT_UNIQUE = "an impact loses its speed while both sides push outward: the motion is not unique there"
     GRAZES_INTO_REST = "the orbit shrinks to rest"
