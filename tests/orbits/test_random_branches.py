@@ -82,7 +82,7 @@ def test_ends_on_bounds_are_orbits_of_the_branch(seed):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("seed", (*FEW, *MANY))
+@pytest.mark.parametrize("seed", [*FEW, *MANY])
 def test_special_points_stability_and_ends_of_many_branches(seed):
     if not isinstance(followed(seed, STEP).orbits[0], RestingOrbit):
         same_specials(seed, 0.1)
