@@ -2,9 +2,13 @@
 
 import signal
 import subprocess
+from functools import cache
 
 import pytest
+from typer.main import get_command
 from typer.testing import CliRunner
+
+_built_once = cache(get_command)
 
 
 def _heed_interrupts():
@@ -29,9 +33,12 @@ def started():
 
 
 @pytest.fixture
-def saltus():
+def saltus(monkeypatch):
     """Run `saltus` with arguments, in this process; a traceback fails the test."""
     from saltus.cli.app import app
+
+    # The runner builds all commands anew for each call, which takes twice as long as what most of these tests ask.
+    monkeypatch.setattr("typer.testing._get_command", _built_once, raising=False)
 
     def run(*arguments):
         result = CliRunner().invoke(app, [str(a) for a in arguments], prog_name="saltus", env={"COLUMNS": "160", "NO_COLOR": "1"})

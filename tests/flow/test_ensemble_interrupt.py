@@ -47,7 +47,7 @@ def test_ctrl_c_ends_an_ensemble_at_once(n, periods, options):
     program = ENDLESS.format(n=n, periods=periods, options=options)
     with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout.readline() == "ready\n"
-        time.sleep(1.0)
+        time.sleep(0.2)
         os.kill(process.pid, signal.SIGINT)
         begin = time.monotonic()
         patience = threading.Timer(60.0, process.kill)

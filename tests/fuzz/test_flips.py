@@ -51,8 +51,16 @@ def files_of(kind, folder):
     return sorted(file for file in store.rglob("*") if file.is_file())
 
 
-def content_of(kind, folder, file):
-    """What is read of the flipped file, of a part of a diagram's search the part.
+def home_of(kind, folder, file):
+    """What a file is read as part of: itself, a store, or of a diagram's search a part of its store."""
+    if kind in ("netcdf", "study"):
+        return file
+    homes = ("parts", "out", folder.name)
+    return next(place for place in file.parents if (place / "zarr.json").is_file() and place.parent.name in homes)
+
+
+def content_of(kind, folder, home):
+    """What is read of the flipped file's home.
 
     Raises
     ------
@@ -60,15 +68,13 @@ def content_of(kind, folder, file):
         The damage is noticed.
     """
     if kind == "netcdf":
-        return read_dataset(file)
+        return read_dataset(home)
     if kind == "study":
         return asked_again(folder)
-    homes = ("parts", "out", folder.name)
-    store = next(place for place in file.parents if (place / "zarr.json").is_file() and place.parent.name in homes)
-    found = (status(store, verify=True), *parts_of(store, verify=True))
+    found = (status(home, verify=True), *parts_of(home, verify=True))
     if any(each.damaged for each in found):
         raise SaltusError("status --verify names it")
-    return open_store(store).load()
+    return open_store(home).load()
 
 
 def asked_again(folder):
@@ -89,7 +95,8 @@ def test_a_flipped_bit_is_noticed_or_harmless(results, tmp_path, monkeypatch, ki
 
     folder = shutil.copytree(results, tmp_path / "copy")
     rng, files = random.Random(kind), files_of(kind, folder)
-    good = {file: content_of(kind, folder, file) for file in files}
+    homes = {file: home_of(kind, folder, file) for file in files}
+    good = {home: content_of(kind, folder, home) for home in {*homes.values()}}
     monkeypatch.setattr(execution, "attempt", begun)
     told = {"noticed": 0, "harmless": 0}
     for case in range(count):
@@ -100,11 +107,11 @@ def test_a_flipped_bit_is_noticed_or_harmless(results, tmp_path, monkeypatch, ki
         flipped[place // 8] ^= 1 << place % 8
         file.write_bytes(flipped)
         try:
-            read = content_of(kind, folder, file)
+            read = content_of(kind, folder, homes[file])
         except SaltusError:
             told["noticed"] += 1
         else:
-            assert read.identical(good[file]), f"case {case}: bit {place} of {file} is read in silence"
+            assert read.identical(good[homes[file]]), f"case {case}: bit {place} of {file} is read in silence"
             told["harmless"] += 1
         file.write_bytes(content)
     print(kind, told)  # the counts, with -s

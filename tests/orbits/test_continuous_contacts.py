@@ -25,6 +25,14 @@ def branch_of(name, step=0.1):
     return saltus.continue_orbit(saltus.find_orbit(soft_stop(**numbers), x=0.0), FREQUENCY, bounds, step=step)
 
 
+@cache
+def mapped(name):
+    """The points of a branch but for the special ones, with their states after a period and the derivatives, by DOP853."""
+    branch = branch_of(name)
+    points = [p for p in branch.points if not any(np.array_equal(p.place, s.point.place) for s in branch.special)]
+    return [(point, *variational_map(point.orbit.system, np.array(point.orbit.state))) for point in points]
+
+
 def marks(branch):
     return sorted((str(s.kind), s.parameter) for s in branch.special)
 
@@ -46,10 +54,10 @@ def test_multipliers_at_a_grazing_are_those_of_the_variational_equation(name):
 
 @every_case
 def test_multipliers_along_the_branch_are_those_of_the_variational_equation(name):
-    points = [p for p in branch_of(name).points if min(p.orbit.clearance, p.orbit.shallowest) > 1e-6]
-    for point in points[:: len(points) // 25]:
-        shallow = min(point.orbit.clearance, point.orbit.shallowest) < 1e-2
-        end, derivative = variational_map(point.orbit.system, np.array(point.orbit.state), longest=0.01 if shallow else np.inf)
+    points = [p for p in mapped(name) if min(p[0].orbit.clearance, p[0].orbit.shallowest) > 1e-6]
+    for point, end, derivative in points[:: len(points) // 25]:
+        if min(point.orbit.clearance, point.orbit.shallowest) < 1e-2:
+            end, derivative = variational_map(point.orbit.system, np.array(point.orbit.state), longest=0.01)
         assert end == pytest.approx(point.orbit.state, abs=1e-9)
         trace = point.orbit.multipliers.sum().real
         assert trace == pytest.approx(np.trace(derivative), abs=1e-6 * (1 + abs(trace)))
@@ -69,8 +77,7 @@ def test_marks_are_the_same_at_other_steps(name):
 def test_the_branch_has_the_special_points_that_a_shooting_method_of_another_integrator_shows_and_no_others(name):
     """det(M - 1) and det(M + 1) of DOP853 vanish at LP and PD, and change sign along the branch as often as there are such."""
     branch = branch_of(name)
-    points = [p for p in branch.points if not any(np.array_equal(p.place, s.point.place) for s in branch.special)]
-    matrices = [variational_map(p.orbit.system, np.array(p.orbit.state))[1] for p in points]
+    matrices = [derivative for _, _, derivative in mapped(name)]
     for kind, sign in ((SpecialKind.LP, -1.0), (SpecialKind.PD, 1.0)):
         determinants = np.array([np.linalg.det(m + sign * np.eye(2)) for m in matrices])
         expected = [s for s in branch.special if s.kind == kind]

@@ -12,7 +12,7 @@ from saltus.attractors import lyapunov_many
 from saltus.files import write_dataset
 from saltus.flow import find_recurrence
 from saltus.orbits import find_orbit, follow_stable, search_orbits
-from saltus.paper import FIGURES, ClaimVerdict
+from saltus.paper import FIGURES, ClaimVerdict, panel_work
 from saltus.paper.figures.harmonic_loads import under_force
 from saltus.paper.measures import chart_areas, chart_measures
 from saltus.plots import figure_of
@@ -27,7 +27,9 @@ QUICK = {
 
 @functools.cache
 def data():
-    return FIGURES["fig14"].compute(charts=QUICK, size=9, curves=3, starts=6)
+    with pytest.MonkeyPatch.context() as here:
+        here.setattr(panel_work, "available_cores", lambda: 1)  # to start a process for each of two panels takes longer
+        return FIGURES["fig14"].compute(charts=QUICK, size=9, curves=3, starts=6)
 
 
 @pytest.mark.thorough

@@ -8,7 +8,6 @@ import pytest
 
 from saltus.flow import available_cores
 from saltus.paper.panel_work import compute_panels
-from saltus.paper.parts import FIGURES, ORDER
 
 
 def marked(folder: str, name: str, value: int) -> int:
@@ -61,4 +60,6 @@ def test_panels_that_are_computed_at_the_same_time_share_the_cores(tmp_path: Pat
 
 
 def test_every_part_is_computed_once():
+    from saltus.paper.parts import FIGURES, ORDER  # all of the paper, which the processes of the other tests need not import
+
     assert sorted(ORDER) == sorted(FIGURES)

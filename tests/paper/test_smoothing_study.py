@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 from claim_verdicts import verdicts
+from picture_checks import check_provenance, clipped
 from scipy.integrate import solve_ivp
 
 from saltus.paper import FIGURES, ClaimVerdict
@@ -17,6 +18,11 @@ BETA0 = math.radians(80.0)
 @cache
 def data():
     return FIGURES["smoothing"].compute(count=33)
+
+
+@cache
+def smoothed(sharpness):
+    return smoothing._branch(sharpness)
 
 
 def rate(t, y, frequency, sign):
@@ -41,15 +47,14 @@ def settled(frequency, sharpness, state, periods=60):
 
 @pytest.mark.parametrize(("frequency", "sharpness"), [(0.275, 50.0), (0.6, 50.0), (0.6, 200.0)])
 def test_smoothed_branches_are_those_of_an_independent_integrator(frequency, sharpness):
-    branch = smoothing._branch(sharpness)
-    (orbit,) = (orbit for orbit in branch.at(frequency) if orbit.stable)
+    (orbit,) = (orbit for orbit in smoothed(sharpness).at(frequency) if orbit.stable)
     assert settled(frequency, sharpness, tuple(map(float, orbit.state))) == pytest.approx(orbit.amplitude, abs=2e-3)
 
 
 def test_a_sharp_smoothing_leaves_the_hump_of_a_blunt_one_as_the_exact_motion_does():
-    (orbit,) = (orbit for orbit in smoothing._branch(50.0).at(0.28) if orbit.stable)
+    (orbit,) = (orbit for orbit in smoothed(50.0).at(0.28) if orbit.stable)
     sharp = settled(0.28, 20000.0, tuple(map(float, orbit.state)))
-    exact = smoothing._confirmed({50.0: smoothing._branch(50.0)}, 11)  # 0.28 is the first of its frequencies
+    exact = smoothing._confirmed({50.0: smoothed(50.0)}, 11)  # 0.28 is the first of its frequencies
     assert float(exact["frequency"][0]) == pytest.approx(0.28)
     for amplitude in (sharp, float(exact["settled"][0])):  # both wander there, a little differently
         assert 0.01 < amplitude - orbit.amplitude < 0.05
@@ -67,6 +72,11 @@ def test_every_claim_of_the_study_holds():
     ours = {id for id, verdict in found.items() if verdict is ClaimVerdict.HOLDS}
     assert ours == {"smoothing-primary", "smoothing-order", "smoothing-grazings", "smoothing-work"}
     assert {id for id, verdict in found.items() if verdict is ClaimVerdict.AS_PRINTED} == found.keys() - ours
+
+
+def test_the_data_says_where_it_comes_from_and_no_picture_is_clipped():
+    check_provenance("smoothing", data())
+    assert clipped(FIGURES["smoothing"].draw(data())) == []
 
 
 @pytest.mark.parametrize(

@@ -43,6 +43,20 @@ def results():
     return result
 
 
+@pytest.fixture(scope="module")
+def pictures(results):
+    """The axes of each result's picture of its own, by name, each laid out once."""
+    made = {}
+
+    def axes(name):
+        if name not in made:
+            made[name] = saltus.plot(results(name))
+            plots.figure_of(made[name]).draw_without_rendering()
+        return made[name]
+
+    return axes
+
+
 def test_every_public_function_has_a_result_here_or_a_reason():
     functions = {name for name in public() if name.partition(".")[0] != "theory" and not name[0].isupper()}
     checked = {"theory"}  # formulas, which give numbers
@@ -63,7 +77,7 @@ def test_a_result_is_drawn_into_axes_that_are_given(name, results):
     assert figure.axes[0] is ax
     assert ax.has_data()
     assert ax.xaxis.label.get_fontsize() == size
-    figure.canvas.draw()
+    figure.draw_without_rendering()
     plt.close(figure)
 
 
@@ -95,11 +109,10 @@ def numbers_on(axis):
 
 
 @pytest.mark.parametrize("name", RESULTS)
-def test_a_picture_of_its_own_names_every_axis_with_its_unit_and_cuts_no_text(name, results):
-    axes = saltus.plot(results(name))
+def test_a_picture_of_its_own_names_every_axis_with_its_unit_and_cuts_no_text(name, pictures):
+    axes = pictures(name)
     figure = plots.figure_of(axes)
     assert isinstance(figure, Figure)
-    figure.draw_without_rendering()
     panels = np.ravel(axes).tolist()
     below = panels[-1] if "chaotic" in name or "diagram" in name else None  # panels that share the axis below them
     assert all(ax.get_ylabel() and (ax.get_xlabel() or ax is not below or below is None) for ax in panels)
@@ -119,10 +132,8 @@ def test_a_picture_of_its_own_names_every_axis_with_its_unit_and_cuts_no_text(na
 
 
 @pytest.mark.parametrize("name", RESULTS)
-def test_numbers_on_an_axis_do_not_overlap(name, results):
-    axes = saltus.plot(results(name))
-    plots.figure_of(axes).draw_without_rendering()
-    for ax in np.ravel(axes).tolist():
+def test_numbers_on_an_axis_do_not_overlap(name, pictures):
+    for ax in np.ravel(pictures(name)).tolist():
         boxes = [label.get_window_extent() for label in numbers_on(ax.xaxis)]
         assert all(one.x1 < other.x0 for one, other in itertools.pairwise(boxes)), ax.get_xlabel()
 

@@ -108,7 +108,7 @@ def heard(share, what, times=[]):
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell's background jobs are started without
 try:
-    write_dataset({path!r}, response_spectrum(forced(1.0), FREQUENCY, (0.3, 3.0), starts=100, max_period=3, progress=heard))
+    write_dataset({path!r}, response_spectrum(forced(1.0), FREQUENCY, (0.3, 3.0), starts=30, max_period=3, progress=heard))
 except KeyboardInterrupt:
     print("interrupted", flush=True)
 """
@@ -124,7 +124,7 @@ def test_ctrl_c_leaves_nothing_half_written(when, tmp_path):
         patience.start()
         try:
             assert process.stdout.readline() == "ready\n"
-            time.sleep(0.5)
+            time.sleep(0.2)
             os.kill(process.pid, signal.SIGINT)
             begin = time.monotonic()
             answers = process.stdout.read().split()

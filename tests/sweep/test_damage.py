@@ -228,14 +228,14 @@ def test_a_forged_fill_value_is_a_sentence(store, fill):
         open_store(store)
 
 
-def test_a_million_chunks_that_are_not_there_are_counted_at_once(tmp_path):
-    """Once each was asked of the disk alone, and each was looked for in every row: hours."""
-    axes = {"x": np.arange(1e6), "y": np.arange(1.0)}
+def test_hundreds_of_thousands_of_chunks_that_are_not_there_are_counted_at_once(tmp_path):
+    """Once each was asked of the disk alone, and each was looked for in every row: an hour."""
+    axes = {"x": np.arange(3e5), "y": np.arange(1.0)}
     plan = Plan(function="sweep_toys:waves", axes=axes, chunk={"x": 1}, variables={"height": Variable()})
     with opened(plan, tmp_path / "store"):
         pass
     found = status(tmp_path / "store", verify=True)
-    assert (found.done, found.total, found.damaged) == (0, 1_000_000, ())
+    assert (found.done, found.total, found.damaged) == (0, 300_000, ())
 
 
 @pytest.mark.parametrize("name", [files.CHECKSUMS, files.FAILURES, "zarr.json", "height/c/0/0"])
