@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from typing import Any
 
 from saltus.errors import ParameterError, near, shown
@@ -19,9 +20,13 @@ def children(node: Any) -> dict[str, Any]:
         return {"frequency": node.frequency, **node.channels}
     if isinstance(node, (Sum, Factors)):
         return {str(i): term for i, term in enumerate(node.terms if isinstance(node, Sum) else node)}
-    if dataclasses.is_dataclass(node):
-        return {f.name: getattr(node, f.name) for f in dataclasses.fields(node)}
-    return {}
+    return {name: getattr(node, name) for name in _fields_of(type(node))}
+
+
+@cache
+def _fields_of(kind: type) -> tuple[str, ...]:
+    """The names of the fields of a dataclass; none of any other class."""
+    return tuple(f.name for f in dataclasses.fields(kind)) if dataclasses.is_dataclass(kind) else ()
 
 
 def is_number(value: Any) -> bool:
