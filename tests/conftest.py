@@ -10,7 +10,7 @@ settings.load_profile("the same in every run")
 
 # Among random numbers Hypothesis mixes those that stand in the sources of the modules that have been imported: they depend on the
 # tests that ran before in the same process. It also reads all of the generated sources, for ten seconds in each process.
-if hasattr(providers, "_get_local_constants"):
+if hasattr(providers, "_get_local_constants") and hasattr(providers, "_local_constants"):
     providers._get_local_constants = lambda: providers._local_constants
 
 
