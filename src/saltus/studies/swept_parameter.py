@@ -165,7 +165,7 @@ def frequency_sweep(
     Returns
     -------
     xarray.Dataset
-        A Dataset. Over (direction, value): `amplitude` (the largest absolute value), `largest_...` and `smallest_...` of the first
+        A Dataset. Over (direction, value): `amplitude` (largest absolute value), `largest_...` and `smallest_...` of the first
         coordinate in the motion's period; `impact_count`, `period` (0: it does not repeat itself), `outcome` and the state at
         phase 0. Over (value): `hysteresis`. Over (jump): its direction, the values that enclose it and the amplitudes there. At
         values that were not reached, as a margin ended the motion before, there is nan.

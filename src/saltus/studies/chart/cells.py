@@ -41,8 +41,8 @@ class CellSettings:
     patience: int = 4
     patient_with: int = 3
     negligible: float = 0.5  # Motions below this share of the least amplitude are not followed until they settle.
-    # A motion fades if its amplitude in a forcing period is below this share of that in the period before, as motions do that come
-    # to rest under slow loads. It is not followed to its end: small motions have thousands of impacts in a period.
+    # A motion fades if its amplitude in a forcing period is below this share of that in the period before, as under slow loads if
+    # it comes to rest. It is not followed to its end: small motions have thousands of impacts in a period.
     fading: float = 0.5
     kept: int = 9  # Stroboscopic states from which the limit of a motion is extrapolated: enough for periods 1 and 2.
     rounds: int = 400  # The most rounds of starts from neighbours: more than the cells along a side of any chart.
