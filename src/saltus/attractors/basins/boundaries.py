@@ -93,7 +93,7 @@ def edges(label: Label, labels: np.ndarray, along: np.ndarray, velocity: np.ndar
 
 
 def edge_saddles(system: System, low: np.ndarray, high: np.ndarray) -> list[PeriodicOrbit]:
-    """The saddle orbits near which motions from both sides of the boundary come; and their mirror images."""
+    """The saddle orbits near which motions on the boundary come, and their mirror images."""
     found: list[PeriodicOrbit] = []
     for track in section_states(system, 0.5 * (low + high), SETTINGS.tracked) if len(low) else ():
         for state, period in _returns(track):
@@ -107,7 +107,7 @@ def edge_saddles(system: System, low: np.ndarray, high: np.ndarray) -> list[Peri
 
 
 def _returns(track: np.ndarray) -> list[tuple[np.ndarray, int]]:
-    """The states of a motion nearest to which it comes back, and after how many periods, for each number of these."""
+    """For each period up to the longest, the state of a motion to which it returns most closely after this period, if near."""
     chosen = []
     for q in range(1, SETTINGS.max_period + 1):
         apart = np.abs(track[q:] - track[:-q]).max(axis=1)
@@ -119,7 +119,8 @@ def _returns(track: np.ndarray) -> list[tuple[np.ndarray, int]]:
 
 
 def clipped(curves: list[np.ndarray], window: Window) -> np.ndarray:
-    """The curves in a row, (n, 2), with nan between them and where they are outside the window by more than its half."""
+    """The curves one after the other, (n, 2), with nan between them and where they are more than 1.5 half widths from the middle
+    of the window."""
     parts = [np.full((0, 2), np.nan)]
     for curve in curves:
         far = ~(np.abs(window.scaled(curve)) <= SETTINGS.margin).all(axis=1)

@@ -141,8 +141,8 @@ def basins_of_attraction(
         Called with the fraction done and what is being done.
     coordinates
         The coordinates of the grid, by the model's name: theta=np.linspace(-2, 2, 201). With several coordinates two state
-        variables are lists, such as theta_1 and theta_1_velocity; the others are held fixed, by default at rest at their contacts,
-        or at 0 without one.
+        variables are lists, such as theta_1 and theta_1_velocity; the others are held fixed, by default at rest at their
+        contacts, or at 0 without one.
 
     Returns
     -------
