@@ -1,4 +1,4 @@
-"""What a part of the paper is: a computation, a picture drawn from its dataset, and what is measured for its claims."""
+"""A part of the paper: a computation, a picture drawn from its dataset, and the measures for its claims."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from saltus.paper.toml_tables import toml_table
 class PaperFigure:
     """One figure, table or group of statements of the paper, which `reproduce` makes by its name.
 
-    1. `panels(**parameters)` returns a function without arguments for each panel, and `join` makes of what they return by the
-       panels' names an xarray DataTree: every number behind the picture, with units;
+    1. `panels(**parameters)` returns a function without arguments for each panel, and `join` makes an xarray DataTree of their
+       results by the panels' names: every number behind the picture, with units;
     2. `draw(data)` returns a matplotlib Figure from nothing but that data, or is None where there is nothing to draw;
     3. `measure(data)` returns the numbers for its claims, again from nothing but the data; the tables of claims hold the rest;
     4. `table(data)`, where given, returns Markdown.
