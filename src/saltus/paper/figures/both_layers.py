@@ -34,12 +34,12 @@ class BothLayersSettings:
 
     settling: int = 300  # Forcing periods in which motions settle on the reduced model's attractors: with C = 0.1 most do.
     following: int = 300  # Forcing periods for which the full motion from a reduced attractor's state is followed.
-    same: float = 1e-6  # The largest distance of the states at phase 0, over the amplitude, where both attractors are one.
-    near: float = 0.01  # The same where the attractor is hardly another: a mass m = 0.01 alone changes it by so much.
-    moved: float = 0.1  # The same where it is moved; what is farther away is another attractor.
+    same: float = 1e-6  # Attractors are the same up to this distance of their states at phase 0, relative to the amplitude.
+    near: float = 0.01  # Up to this distance they hardly differ: a mass m = 0.01 alone changes an attractor by so much.
+    moved: float = 0.1  # Up to this distance the attractor has moved; farther away it is another one.
     starts: tuple[tuple[float, float], ...] = ((0.05, 0.0), (0.6, 0.0), (1.5, 0.0), (2.2, 0.0), (-0.8, 0.0), (-2.0, 1.0))
-    portrait_mass: float = 0.001  # m of the motions beside Figs. 4 and 5: with m = 0 they stop where the hinge is singular.
-    settle_time: float = 400.0  # in which a damped motion comes to rest, C = 0.1.
+    portrait_mass: float = 0.001  # m of the motions compared with Figs. 4 and 5: with m = 0 they end where M is singular.
+    settle_time: float = 400.0  # The time in which damped motions come to rest, C = 0.1.
 
 
 SETTINGS = BothLayersSettings()

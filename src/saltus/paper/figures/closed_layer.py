@@ -22,7 +22,8 @@ class ClosedLayerSettings:
 
     motions: int = 12  # The number of stable motions of a diagram, spread evenly over its branches' points.
     instants: int = 4000  # The number of instants of an orbit's period at which the reaction is evaluated.
-    # It is also evaluated this share of the period after the beginning and before the end of each arc, where it is often least.
+    # The reaction is also evaluated this share of the orbit's duration after the beginning and before the end of each arc, where
+    # it is often least.
     beside: float = 1e-9
 
 

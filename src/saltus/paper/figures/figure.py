@@ -27,14 +27,14 @@ class PaperFigure:
     name: str
     title: str
     caption: str
-    section: str = ""  # its number in the paper; none where the statements are of several sections
+    section: str = ""  # its number in the paper; empty if the statements belong to several sections
     panels: Callable[..., Panels]
     join: Callable[[dict[str, Any]], Any]
     measure: Callable[[Any], Measures] = lambda data: {}
     draw: Callable[[Any], Any] | None = None
     table: Callable[[Any], str] | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
-    module: str  # that computes it
+    module: str  # the module that computes it
 
     def compute(self, **parameters: Any) -> Any:
         """The data of all panels together, for parameters that need not be the paper's."""
