@@ -322,7 +322,7 @@ WORDS: dict[Any, str] = {
     dict: "a dict",
     type(None): "None",
 }
-SOURCES = {  # the functions that return an object of a class
+SOURCES = {  # where a user gets an object of a class from
     "PeriodicOrbit": "find_orbit or search_orbits",
     "SpecialPoint": "branch.special",
     "Attractors": "find_attractors",

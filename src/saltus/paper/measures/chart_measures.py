@@ -56,7 +56,8 @@ def over_frequency(data: Any) -> dict[str, Measured]:
 
 
 def _anticipates(panels: Panels) -> Measured:
-    """As printed: at every frequency. Erratum 34: not far below resonance, where cells with nothing but rest are even gained."""
+    """As printed: at every frequency motions appear before the quasi-static border. Erratum 34: not far below resonance, where
+    even more cells have rest alone."""
     rows = [{"frequency": w, "lost": lost(tree), "gained": gained(tree), "outside": outside(tree)} for w, tree in panels.items()]
     always = bool(rows) and all(row["lost"] > row["gained"] for row in rows)
     fast = bool(rows) and all((row["lost"] > row["gained"]) == (row["frequency"] > CRITERIA.slow) for row in rows)
@@ -91,7 +92,8 @@ def _largest_amplitude(panels: Panels) -> Measured:
 
 
 def _second_motion(panels: Panels) -> Measured:
-    """As printed: in a narrow region. Erratum 33: in a strip of six impacts below Hcr, and wide ones of longer periods."""
+    """As printed: a second motion exists in a narrow region. Erratum 33: in a strip below Hcr with six impacts, and in wide
+    regions with longer periods."""
     fast = max(panels)
     cells = chart_cells(panels[fast])
     domain, period_three = cells.static, cells.with_motion(3, 2)
@@ -195,7 +197,8 @@ def _farthest(ratio: np.ndarray) -> float:
 
 
 def _amplitude_falls(panels: Panels) -> Measured:
-    """As printed: from chart to chart in nearly all cells where both have motions. Erratum 46: the largest one of all."""
+    """As printed: amplitudes fall from chart to chart in nearly all cells in which both have motions. Erratum 46: only the
+    largest amplitude of each chart does."""
     sizes = {value: chart_cells(tree).amplitude for value, tree in panels.items()}
     largest = [float(np.nanmax(size)) for size in sizes.values()]
     shares = []

@@ -228,7 +228,8 @@ def _critical(spectrum: Any) -> float:
 
 
 def _undeformed(panels: Panels) -> Measured:
-    """As printed: past Hcr motions leave for the limit cycle. Erratum 24: rest is left, and closed again, in every period."""
+    """As printed: beyond Hcr motions go from rest to the limit cycle. Erratum 24: rest is left, and reached again, in every
+    period."""
     turns, gone, rows = [], [], []
     for frequency, tree in panels.items():
         row = tree["undeformed"]
@@ -264,7 +265,8 @@ def _anticipated(panels: Panels) -> Measured:
 
 
 def _grows(panels: Panels) -> Measured:
-    """As printed: from its birth on. Erratum 30: from twice Hcr on, past the superharmonics of low frequency."""
+    """As printed: the first cycle's amplitude grows with Hhat from its birth on. Erratum 30: from twice Hcr on, beyond the
+    superharmonics at low frequencies."""
     always, later, rows = [], [], []
     for frequency, tree in panels.items():
         main = main_branch(tree)
@@ -292,7 +294,8 @@ def _rises(sizes: np.ndarray) -> bool:
 
 
 def _flattens(panels: Panels) -> Measured:
-    """As printed: everywhere. Erratum 30: where both frequencies are above the primary resonance, or the load is large."""
+    """As printed: the first cycle's amplitude falls with Omega at every load. Erratum 30: if both frequencies are above the
+    primary resonance, or the load is large."""
     critical = _critical(next(iter(panels.values())))
     sizes = np.array([_largest(main_branch(tree), critical * LOADS) for tree in panels.values()])
     falls, several = np.diff(sizes, axis=0) < 0, len(panels) > 1
@@ -302,7 +305,8 @@ def _flattens(panels: Panels) -> Measured:
 
 
 def coexistence(panels: Panels) -> Measured:
-    """As printed: their number grows with the load. Erratum 38: several coexist, but their mean number falls again.
+    """As printed: the number of coexisting stable motions grows with the load. Erratum 38: several coexist, but their mean number
+    falls again.
 
     The means are those over the quarters of the range beyond twice Hcr, by the branches and, independently, by the attractors on
     which simulated motions have settled.
@@ -339,7 +343,8 @@ def _means(values: np.ndarray, number: np.ndarray, edges: np.ndarray) -> np.ndar
 
 
 def border_of_rest(data: Any) -> Measured:
-    """As printed: theta = 0 is held up to abs(V / tan(beta0)) under load (iii). Erratum 35: while the ellipse lies inside."""
+    """As printed: theta = 0 is held up to abs(V / tan(beta0)) under load (iii). Erratum 35: as long as the ellipse of the loads
+    lies inside the border."""
     rest, disturbed, critical = data["undeformed"], data["disturbed"], _critical(data["a"])
     below, above, printed = map(float, disturbed["moved"].values)
     turns = bool(rest["held_below"]) and not bool(rest["held_above"])
