@@ -15,7 +15,7 @@ from lazy_loader import attach_stub
 
 from saltus.errors import ParameterError, near
 
-FOR_USERS = ("saltus.theory",)  # of which users call every function, beside those that `saltus` itself names
+FOR_USERS = ("saltus.theory",)  # rooms all of whose functions are for users, besides those that `saltus` itself names
 
 
 def front_door(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
@@ -24,7 +24,7 @@ def front_door(package: str, file: str) -> tuple[Callable[[str], Any], Callable[
     Raises
     ------
     AttributeError
-        By `__getattr__`, of a name that is not there, with the names that are near to it.
+        Raised by `__getattr__` for an unknown name; the error gives similar names.
     """
     load, names, public = attach_stub(package, file)
     sys.modules[package].__class__ = Room
@@ -36,14 +36,14 @@ def front_door(package: str, file: str) -> tuple[Callable[[str], Any], Callable[
                 found = vars(sys.modules[package])[name] = _answering(found)  # lazy_loader 0.6 keeps there what it has loaded
             return found
         if os.path.exists(os.path.join(os.path.dirname(file), f"{name}.py")):
-            raise AttributeError(name)  # asked for by Python, which then imports the file
+            raise AttributeError(name)  # Python asks for the name of a file, which it then imports
         raise AttributeError(f"{package} has no {name!r}; {near(name, public)}")
 
     return get, names, public
 
 
 class Room(ModuleType):
-    """A package of saltus: called by mistake it names the functions that may be meant."""
+    """A package of saltus; if it is called by mistake, the error names the functions that may be meant."""
 
     def __call__(self, *given: Any, **named: Any) -> Any:
         own = self.__name__.rpartition(".")[2]
@@ -53,7 +53,7 @@ class Room(ModuleType):
 
 
 def _answering(found: Any) -> Any:
-    """A public function that answers arguments of a wrong kind by their names; whatever else has a name as it is."""
+    """A public function, made to refuse arguments of a wrong kind by their names; anything else is returned as it is."""
     if not isinstance(found, FunctionType) or hasattr(found, "answers"):
         return found
     from saltus.public_functions import answered

@@ -1,4 +1,4 @@
-"""Branches of a diagram's DataTree as lines over the parameter, and borders of a chart's: what pictures draw and measures read.
+"""Branches of a diagram's DataTree, and borders of a chart's, as lines that are drawn in pictures and read by measures.
 
 A branch (see `branch_tables.py`) has `parameter`, `stable`, `impact_count` and quantities such as `amplitude` over its points,
 the model's margins as `margin_...`, and the `kind` of its special points with their places.
@@ -12,16 +12,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-STEPS_BETWEEN = 6  # into which the step between two points of a branch is divided where the line is smoothed
+STEPS_BETWEEN = 6  # the number of parts into which a step between two points of a branch is divided to smooth the line
 # The kinds of special points at which the stability can change.
 STABILITY_CHANGES = ("LP", "PD", "BPC", "GR", "NS", "SW", "GS", "CS", "SS", "AS")
-MARGIN = "margin_"  # the names of the variables of a branch that hold the least value of a margin begin so
+MARGIN = "margin_"  # the beginning of the names of a branch's variables with the least value of a margin
 
 
 class ModelValidity(StrEnum):
     """Whether motions of a model are those of its mechanism, by the margins that they pass and the `margin_kind` of each."""
 
-    HOLDS = "holds"  # none but landmarks
+    HOLDS = "holds"  # they pass no margins except landmarks
     ASSUMPTION = "assumption"  # an assumption of the model fails: the mechanism does something else
     LIMIT = "limit"  # the mechanism has no such positions
 
@@ -53,7 +53,7 @@ def branch_lines(branch: Any, quantity: str = "amplitude") -> Iterator[BranchLin
         yield BranchLine(
             bool(stable[first]), validity[first], range(first, cut), np.concatenate([begin, places[first:cut], ends[:1]])
         )
-        if len(turns) > 1:  # the stability and the validity change one after the other, between the same two points
+        if len(turns) > 1:  # stability and validity change at different places between the same two points
             mixed = (stable[cut], validity[first]) if turns[0][1] else (stable[first], validity[cut])
             yield BranchLine(bool(mixed[0]), mixed[1], range(cut, cut), ends)
         first, begin = cut, ends[-1:] if len(ends) else places[cut - 1 : cut]
@@ -63,7 +63,7 @@ def branch_lines(branch: Any, quantity: str = "amplitude") -> Iterator[BranchLin
 def validity_of(branch: Any) -> np.ndarray:
     """The `ModelValidity` of each point of a branch, (n,)."""
     result = np.full(branch.sizes["point"], ModelValidity.HOLDS, dtype=object)
-    for validity in (ModelValidity.ASSUMPTION, ModelValidity.LIMIT):  # the graver one last
+    for validity in (ModelValidity.ASSUMPTION, ModelValidity.LIMIT):  # the graver one last, so that it counts
         for name in margins_of(branch, validity):
             result[branch[MARGIN + name].values < 0] = validity
     return result
@@ -76,7 +76,7 @@ def margins_of(branch: Any, kind: ModelValidity) -> list[str]:
 
 
 def _turns(branch: Any, quantity: str, cut: int, stability: bool, validity: bool) -> list[tuple[np.ndarray, bool]]:
-    """Where the stability, the validity or both change between the points cut - 1 and cut, in order; True for the stability."""
+    """The places at which stability or validity change between the points cut - 1 and cut, in order; True for stability."""
     margins = tuple(name for kind in (ModelValidity.ASSUMPTION, ModelValidity.LIMIT) for name in margins_of(branch, kind))
     kinds = [(STABILITY_CHANGES, True)] * stability + [((*margins, "GR"), False)] * validity
     found = [(_place_of_change(branch, quantity, cut, names), of_stability) for names, of_stability in kinds]
@@ -89,7 +89,7 @@ def _turns(branch: Any, quantity: str, cut: int, stability: bool, validity: bool
 
 
 def smooth_lines(branch: Any, quantity: str = "amplitude") -> Iterator[BranchLine]:
-    """The same lines, with places on monotone cubics of the length along them between their points."""
+    """The lines of `branch_lines`, smoothed: with further places on monotone cubics over the length between their points."""
     for line in branch_lines(branch, quantity):
         yield line._replace(places=_smoothed(line.places))
 
@@ -110,7 +110,7 @@ def _smoothed(line: np.ndarray) -> np.ndarray:
 
 
 def _place_of_change(branch: Any, quantity: str, cut: int, kinds: tuple[str, ...]) -> np.ndarray:
-    """Where something changes between the points cut - 1 and cut: at the special point of such kinds there, or in the middle."""
+    """The place of a change between the points cut - 1 and cut: the special point of one of these kinds there, or the middle."""
     names = ("parameter", quantity)
     columns = [branch[name].values for name in names]
     a, b = (np.array([float(column[k]) for column in columns]) for k in (cut - 1, cut))

@@ -1,12 +1,12 @@
-"""The branches of a diagram as few flat tables, and each branch of them as the dataset that it was.
+"""The branches of a diagram as a few flat tables, and each branch as a dataset again.
 
 A file with a group for each of hundreds of branches takes minutes to open. All branches are therefore kept one after the other,
 as contiguous ragged arrays in the manner of the CF conventions:
 
-* `branches`, along `branch`: what is said of each one, how many points and special points it has (`point_count`,
+* `branches`, along `branch`: the attributes of each branch, how many points and special points it has (`point_count`,
   `special_count`), and how many numbers each of its points has in `orbits` (`unknown_size`, ...);
 * `points`, along `point`, and `special`, along `special`: a column for each quantity, and the number of the `branch`;
-* `orbits`: what has several numbers at each point, row after row.
+* `orbits`: the quantities with several numbers at each point, row after row.
 """
 
 from __future__ import annotations
@@ -73,14 +73,14 @@ def branch_of(diagram: xarray.DataTree, number: int) -> xarray.Dataset:
     Parameters
     ----------
     diagram
-        What `bifurcation_diagram` or `response_spectrum` gave.
+        A diagram as `bifurcation_diagram` or `response_spectrum` returns it.
     number
         The number of the branch, from 0 on.
 
     Raises
     ------
     ParameterError
-        A tree without branches, or of fewer.
+        A tree without branches, or with too few.
 
     Examples
     --------

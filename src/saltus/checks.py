@@ -24,26 +24,26 @@ RADIANS = {"unit": "rad"}  # the metadata of a dataclass's field that is an angl
 
 @dataclass(frozen=True)
 class Limits:
-    """The most that may be asked for, on any machine; what a request needs of the memory is estimated beside it."""
+    """The most that may be asked for, on any machine; the memory that a request needs is estimated besides."""
 
-    count: int = 10_000_000  # Motions, points, samples: more of them at once is a slip of the pen, and fits into no memory.
+    count: int = 10_000_000  # Motions, points, samples: more of them at once are a typing error, and fit into no memory.
     periods: int = 10**12  # Forcing periods, or units of time, of one motion: days of one core.
-    threads: int = 1024  # More than a machine has cores; each thread takes memory before it does anything.
-    value: float = 1e100  # Of any number in size: differences and squares of larger ones are no numbers.
-    order: int = 1000  # Of a harmonic: the step of the integrator shrinks with it.
-    seed: int = 2**63 - 1  # What files and random generators hold.
-    motion: int = 2048  # Bytes that a motion of an ensemble takes; 1000 were measured, and samples come to it.
-    dense: int = 6000  # Bytes that a forcing period of one motion takes which is kept whole; 5400 were measured.
+    threads: int = 1024  # No machine has so many cores, and each thread takes memory before it does anything.
+    value: float = 1e100  # The size of any number: differences and squares of larger numbers overflow.
+    order: int = 1000  # The order of a harmonic: the step of the integrator shrinks with it.
+    seed: int = 2**63 - 1  # The largest number that files and random generators can hold.
+    motion: int = 2048  # Bytes that a motion of an ensemble takes; 1000 were measured without its samples.
+    dense: int = 6000  # Bytes that a forcing period of a motion with dense output takes; 5400 were measured.
     work: float = 1e12  # Motions times forcing periods: four days of one core, at three million in a second.
-    # Loops over Taylor coefficients in a model's equations: a minute of compiling; saltus's own have 92 at most.
+    # Loops over Taylor coefficients in a model's equations that take a minute to compile; saltus's own models have 92 at most.
     operations: int = 600
-    nodes: int = 100_000  # Operations of any kind in them, which take a minute too.
-    lanes: float = 3.0  # So many times as long vector lanes of them are compiled; 2.7 were measured.
-    # With its derivatives a system of as many operations, theirs included, takes this share of the time.
+    nodes: int = 100_000  # Operations of any kind in these equations that take a minute to compile.
+    lanes: float = 3.0  # The factor of the time of compiling for vector lanes; 2.7 was measured.
+    # The factor of the time of compiling for a system with derivatives, whose operations are counted too.
     derivatives: float = 0.25
-    compiling: float = 5.0  # Minutes for lanes or derivatives: those of four cells need some of them.
+    compiling: float = 5.0  # The most minutes of compiling for lanes or derivatives, of which those of four cells need some.
     memory: float = 0.8  # The share of the free memory that one request may take: the rest keeps the machine usable.
-    any_machine: float = 1e8  # Bytes that are always there: what needs less is not compared with what is free, which takes time.
+    any_machine: float = 1e8  # Bytes that are always free: smaller requests are not checked, as checking takes time.
 
 
 LIMITS = Limits()
@@ -52,12 +52,12 @@ MOST |= {"seed": LIMITS.seed, "threads": LIMITS.threads, "workers": LIMITS.threa
 
 
 def check_number(name: str, value: Any, **bounds: Any) -> None:
-    """Refuse what is not a finite real number within the bounds of `number_problem`.
+    """Refuse anything but a finite real number within the bounds of `number_problem`.
 
     Raises
     ------
     ParameterError
-        With the name, the range and the value, and a hint where degrees look likely.
+        The error has the name, the range and the value, and a hint if the number is likely in degrees.
     """
     problem = number_problem(value, **bounds)
     if problem is not None:
@@ -113,12 +113,12 @@ def _short(value: float) -> str:
 
 
 def check_count(name: str, value: Any, at_least: int, at_most: int | None = None) -> None:
-    """Refuse what is not a whole number within the stated bounds; the upper one is that of `Limits` where none is given.
+    """Refuse anything but a whole number within the bounds; the upper bound is that of `Limits` if none is given.
 
     Raises
     ------
     ParameterError
-        With the name, the range and the value.
+        The error has the name, the range and the value.
     """
     at_most = MOST.get(name.rpartition(".")[2], LIMITS.count) if at_most is None else at_most
     problem = number_problem(value, at_least=at_least, at_most=at_most)
@@ -143,7 +143,7 @@ def check_memory(name: str, size: float, what: str) -> None:
     Raises
     ------
     ParameterError
-        With the estimate and what is free.
+        The error has the estimate and the free memory.
     """
     free = free_memory() if size > LIMITS.any_machine else math.inf
     if size > LIMITS.memory * free:
@@ -153,12 +153,12 @@ def check_memory(name: str, size: float, what: str) -> None:
 
 
 def check_work(name: str, motions: float, periods: float) -> None:
-    """Refuse what would take days: so many motions of so many forcing periods.
+    """Refuse a number of motions of so many forcing periods that would take days.
 
     Raises
     ------
     ParameterError
-        With the estimate.
+        The error has the estimate.
     """
     if motions * periods > LIMITS.work:
         days = motions * periods / LIMITS.work * 4.0
@@ -170,12 +170,12 @@ def check_work(name: str, motions: float, periods: float) -> None:
 
 
 def check_starts(starts: Any, beside: int = 1) -> None:
-    """Refuse a number of initial states that is none, or that needs too much memory, each `beside` so many others at once.
+    """Refuse a number of initial states that is no such number, or that needs too much memory, `beside` times as many at once.
 
     Raises
     ------
     ParameterError
-        With the range, or the estimate of the memory.
+        The error has the range, or the estimate of the memory.
     """
     check_count("starts", starts, 1)
     each = f" in each of {beside} places" if beside > 1 else ""
@@ -183,7 +183,7 @@ def check_starts(starts: Any, beside: int = 1) -> None:
 
 
 def free_memory() -> float:
-    """The memory that programs can have without others losing theirs, in bytes; infinite where the system does not tell."""
+    """The memory that is available to programs, in bytes; infinite if the operating system does not say it."""
     found = [math.inf]
     with contextlib.suppress(OSError, ValueError, IndexError):
         lines = Path("/proc/meminfo").read_text().splitlines()
@@ -201,12 +201,12 @@ def free_memory() -> float:
 def check_dataset(
     dataset: Any, source: str, variables: Iterable[str], attributes: Iterable[str] = (), name: str = "dataset"
 ) -> None:
-    """Refuse a dataset without what `source`, the functions that make such ones, puts into it.
+    """Refuse a dataset that lacks variables or attributes of the datasets that `source`, a function, makes.
 
     Raises
     ------
     ParameterError
-        With what it lacks.
+        The error names what is missing.
     """
     lacks = [each for each in variables if each not in dataset] + [each for each in attributes if each not in dataset.attrs]
     if lacks:
@@ -219,7 +219,7 @@ def check_bounds(bounds: Any, name: str = "bounds") -> tuple[float, float]:
     Raises
     ------
     ParameterError
-        Bounds that are no such pair.
+        Bounds that are not such a pair.
     """
     try:
         low, high = (float(x) for x in bounds)
@@ -231,18 +231,18 @@ def check_bounds(bounds: Any, name: str = "bounds") -> tuple[float, float]:
 
 
 def check_step(step: Any) -> None:
-    """Refuse what is no longest step along a curve: shorter ones come nowhere, longer ones are longer than any curve's features.
+    """Refuse longest steps along a curve outside [1e-6, 1]: shorter ones take for ever, longer ones miss its features.
 
     Raises
     ------
     ParameterError
-        No number in [1e-6, 1].
+        A step that is no number in [1e-6, 1].
     """
     check_number("step", step, at_least=1e-6, at_most=1.0)
 
 
 def as_numbers(given: Any) -> np.ndarray:
-    """An array of numbers; an empty one for what is none, so that whoever refuses the one refuses the other."""
+    """An array of numbers; an empty one for anything else, so that functions that refuse an empty array refuse it too."""
     try:
         return np.asarray(given if hasattr(given, "__array__") or not np.iterable(given) else list(given), dtype=float)
     except (TypeError, ValueError):
@@ -255,7 +255,7 @@ def check_axis(name: str, values: Any) -> np.ndarray:
     Raises
     ------
     ParameterError
-        With the name, for what is no list of finite numbers that rise.
+        Anything but a list of finite increasing numbers; the error has the name.
     """
     axis = np.atleast_1d(as_numbers(values))
     if axis.ndim != 1 or not axis.size or not (np.abs(axis) <= LIMITS.value).all() or not (np.diff(axis) > 0).all():
@@ -264,12 +264,12 @@ def check_axis(name: str, values: Any) -> np.ndarray:
 
 
 def check_path(system: Any, path: Any, name: str = "path") -> None:
-    """Refuse what is not the dotted path of a number of the system.
+    """Refuse anything but the dotted path of a number of the system.
 
     Raises
     ------
     ParameterError
-        Of the argument `name`, with the paths that are near.
+        The error is of the argument `name` and gives similar paths.
     """
     if isinstance(path, str) and path in system.parameters:
         return
@@ -286,7 +286,7 @@ def check_along(system: Any, path: str, values: Iterable[float], name: str) -> N
     Raises
     ------
     ParameterError
-        Of the argument `name`, with what the system says.
+        The error is of the argument `name` and has the system's refusal.
     """
     for value in values:
         try:
@@ -301,7 +301,7 @@ def check_reached(model: Any, coordinate: str, values: Any, name: str) -> None:
     Raises
     ------
     ParameterError
-        Of the argument `name`, with the first such value and the contact.
+        The error is of the argument `name` and has the first such value and the contact.
     """
     given = np.atleast_1d(values)
     gaps = {repr(c.name): (c.gap(given), c.position) for c in model.contacts if c.coordinate == coordinate}
@@ -319,7 +319,7 @@ def check_names(name: str, values: Any, meaning: str) -> tuple[str, ...]:
     Raises
     ------
     ParameterError
-        With the name, for what is neither; `meaning` says of what they are the names.
+        Anything else; the error has the name, and `meaning` says of what the texts are the names.
     """
     try:
         texts = (values,) if isinstance(values, str) else tuple(values)
@@ -336,7 +336,7 @@ def instants(times: Any) -> np.ndarray:
     Raises
     ------
     ParameterError
-        What is neither.
+        Anything else.
     """
     try:
         asked = np.atleast_1d(np.asarray(times, dtype=float))
@@ -353,7 +353,7 @@ def check_states(name: str, states: Any, dimension: int = 2) -> np.ndarray:
     Raises
     ------
     ParameterError
-        With the name, for what is no such array, or not finite.
+        Anything but such an array of finite numbers; the error has the name.
     """
     try:
         array = np.asarray(states, dtype=float).reshape(-1, dimension)

@@ -13,7 +13,7 @@ class NumberedSentence(IntEnum):
     sentence: str
 
     def __new__(cls, number: int, sentence: str = "") -> Self:
-        """A member is its number, by which it is looked up."""
+        """A member has its number as value, by which it is looked up."""
         member = int.__new__(cls, number)
         member._value_, member.sentence = number, sentence
         return member
@@ -23,7 +23,7 @@ class NumberedSentence(IntEnum):
 
 
 class Sentence(Enum):
-    """Members whose value and whose `str` is a sentence, in which what names them may fill in numbers."""
+    """Members whose value and whose `str` is a sentence, which may have places for numbers."""
 
     @property
     def code(self) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-LONGEST_NAME, LONGEST_LIST = 80, 200  # characters of what is compared with known names, and of the list of these
+LONGEST_NAME, LONGEST_LIST = 80, 200  # the most characters of a name that is compared with known ones, and of their list
 
 
 class SaltusError(Exception):
@@ -21,14 +21,14 @@ class SaltusError(Exception):
 class ParameterError(SaltusError, ValueError):
     """A value, a name or a combination of them that has no meaning for the system.
 
-    `parameter` is the dotted path of what is wrong, such as "load.frequency" or "max_period", or None where it is no single one.
+    `parameter` is the dotted path of the wrong one, such as "load.frequency" or "max_period", or None if it is not a single one.
 
     Parameters
     ----------
     message
         One sentence: what was wrong, where, and what would be right.
     parameter
-        The dotted path of what is wrong, or None where it is no single one.
+        The dotted path of the wrong parameter, or None if it is not a single one.
 
     Examples
     --------
@@ -48,7 +48,7 @@ class ParameterError(SaltusError, ValueError):
         Parameters
         ----------
         owner
-            What it is a part of, such as "model".
+            The path of the part that contains the parameter, such as "model".
         """
         message = str(self)
         if self.parameter is None:
@@ -84,7 +84,8 @@ class MotionError(SaltusError, RuntimeError):
 class SweepError(SaltusError, RuntimeError):
     """A sweep that cannot go on, or that ended without some of its chunks; what was computed is kept.
 
-    `failures` are the chunks that failed (`saltus.sweep.Failure`); `dataset` is what there is where no store keeps it, else None.
+    `failures` are the chunks that failed (`saltus.sweep.Failure`); `dataset` has the computed chunks if no store keeps them, else
+    it is None.
 
     Parameters
     ----------
@@ -93,7 +94,7 @@ class SweepError(SaltusError, RuntimeError):
     failures
         The chunks that failed, each a `saltus.sweep.Failure`.
     dataset
-        What there is where no store keeps it.
+        The chunks that were computed, if no store keeps them.
 
     Examples
     --------
@@ -107,13 +108,13 @@ class SweepError(SaltusError, RuntimeError):
 
 
 def near(name: str, known: Iterable[str], also: Iterable[str] = ()) -> str:
-    """The end of a sentence about an unknown `name`: the near names, or else all that are known.
+    """The end of a sentence about an unknown `name`: the similar names, or all known ones if none is similar.
 
-    Names in `also` are proposed where they are near, and are not listed otherwise.
+    Names in `also` are proposed if they are similar, and are not listed otherwise.
     """
     import difflib
 
-    known = sorted(str(name) for name in known)  # the repr of an enumeration's member is not what a user writes
+    known = sorted(str(name) for name in known)  # users write the text of an enumeration's member, not its repr
     close = difflib.get_close_matches(name[:LONGEST_NAME], [*known, *also], n=3, cutoff=0.6)
     if close:
         return "did you mean " + " or ".join(repr(c) for c in close) + "?"
@@ -122,7 +123,7 @@ def near(name: str, known: Iterable[str], also: Iterable[str] = ()) -> str:
 
 
 def shown(value: Any, most: int = 60) -> str:
-    """A value as a sentence repeats it: on one line and not longer than `most` characters."""
+    """A value in the form in which a sentence shows it: on one line and not longer than `most` characters."""
     if isinstance(value, int) and abs(value) >= 10**20:
         return "a very large number"  # Python itself refuses to write some of them
     try:
@@ -133,6 +134,6 @@ def shown(value: Any, most: int = 60) -> str:
 
 
 def printable(text: str, most: int = 400) -> str:
-    """Text out of a file, for a terminal: on one line, without characters that it would obey, not longer than `most`."""
+    """Text from a file, for a terminal: on one line, without control characters, not longer than `most` characters."""
     plain = "".join(c if c.isprintable() else " " if c.isspace() else "?" for c in text[: most + 1])
     return plain if len(plain) <= most else plain[: most - 3] + "..."

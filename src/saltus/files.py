@@ -1,8 +1,8 @@
 """Files that are complete or not there, and that notice when they are damaged.
 
-Every output is made in memory, written beside its place, brought to the disk and moved there. A netCDF file ends with a checksum
-of all its bytes, behind what HDF5 reads, so that it is checked before HDF5 opens it. HDF5 reads in a process of its own: whoever
-makes a file can make its checksum too, and what is wrong in it can stop HDF5 or keep it for ever.
+Every output is made in memory, written to a file beside its place, brought to the disk and moved there. A netCDF file ends with a
+checksum of all its bytes, after the part that HDF5 reads, so that it is checked before HDF5 opens it. HDF5 reads in a process of
+its own, as a forged file may have a valid checksum, and errors in it can crash HDF5 or keep it busy for ever.
 """
 
 from __future__ import annotations
@@ -29,36 +29,36 @@ from saltus.checks import check_memory
 from saltus.errors import ParameterError, shown
 
 PART = ".part"
-STALE = 60.0  # s; where there are no locks, what has not been touched for so long was left by a killed run
-COPIES = 2  # of a file's bytes that reading it makes
+STALE = 60.0  # s; without locks, a half-written file that was not touched for so long is taken as left by a killed run
+COPIES = 2  # the number of copies of a file's bytes that reading it makes
 HEAD, TAIL = b"\nsha256 of the bytes before: ", b" (saltus)\n"  # of the checksum: wiping out 64 bytes leaves one of them
 UNCHECKED = "has no checksum (saltus writes one behind each file), so that damage to its numbers cannot be excluded"
-SLOWEST_READ = 1e6  # bytes/s, with LONGEST_OPEN s beside it: HDF5 that takes longer has lost its way in a damaged file
-LONGEST_OPEN = 120.0  # many times what it takes where other work leaves little of the processor
-HDF5 = b"\x89HDF\r\n\x1a\n"  # with which its files begin
-MOST_LINKS, MOST_ATTRIBUTES = 3000, 10_000  # beyond which a netCDF file takes ten seconds to open; Fig. 9 has 828 and 4324
-END_OF_FILE = {0: 40, 1: 44, 2: 28, 3: 28}  # by the version of HDF5's superblock: where it holds the file's length
+SLOWEST_READ = 1e6  # bytes/s, after LONGEST_OPEN s: if HDF5 takes longer, it is lost in a damaged file
+LONGEST_OPEN = 120.0  # s; many times the time that opening takes on a busy machine
+HDF5 = b"\x89HDF\r\n\x1a\n"  # the first bytes of its files
+MOST_LINKS, MOST_ATTRIBUTES = 3000, 10_000  # with more, a netCDF file takes ten seconds to open; Fig. 9 has 828 and 4324
+END_OF_FILE = {0: 40, 1: 44, 2: 28, 3: 28}  # where HDF5's superblock holds the file's length, by its version
 
 
 # --- writing ---------------------------------------------------------------------------------------------------------------
 
 
 def write_durably(path: Path, content: bytes) -> None:
-    """Write a file so that whoever finds it finds all of it, after a kill or a power failure too.
+    """Write a file so that it is either complete or not there, also after a kill or a power failure.
 
-    It is written beside its place, brought to the disk, and moved there; its folder is made as needed. If that fails or is
-    interrupted, `path` is what it was before and nothing is left.
+    It is written to a file beside its place, brought to the disk, and moved there; its folder is made as needed. If this fails or
+    is interrupted, `path` is as it was before and nothing is left beside it.
 
     Raises
     ------
     OSError
-        With the name of the file.
+        The error has the name of the file.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.{os.urandom(6).hex()}{PART}")
     try:
         with part.open("xb") as file:
-            lock(file)  # by which `sweep_up` knows that somebody still writes it
+            lock(file)  # tells `sweep_up` that the file is still being written
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
@@ -95,7 +95,7 @@ def write_dataset(path: Path | str, dataset: Any) -> Path:
 def write_figure(stem: Path | str, figure: Any, title: str | None = None) -> list[Path]:
     """Write a matplotlib Figure as `stem`.png and `stem`.pdf, the same bytes for the same figure; `title` is that of the PDF.
 
-    The PDF has the layout of the PNG: to find one takes a third of the time of both.
+    The PDF has the layout of the PNG, as computing a second layout would take a third of the time of both.
     """
     png = _write_picture(Path(f"{stem}.png"), figure, "png", {})
     layout = figure.get_layout_engine()
@@ -113,7 +113,7 @@ def _write_picture(path: Path, figure: Any, kind: str, metadata: dict[str, Any])
 
 
 def sweep_up(parts: Iterable[Path]) -> None:
-    """Remove those of the files that no process is writing: killed runs left them."""
+    """Remove the files that no process is writing any more, as they were left by killed runs."""
     for part in parts:
         with contextlib.suppress(OSError), part.open("rb") as file:
             mine = lock(file)
@@ -122,8 +122,8 @@ def sweep_up(parts: Iterable[Path]) -> None:
 
 
 def lock(file: IO[bytes], shared: bool = False, wait: bool = False) -> bool | None:
-    """Try to lock an open file until it is closed or its process ends, or wait for it: whether it could, None where there are no
-    locks."""
+    """Lock an open file until it is closed or its process ends; with `wait`, wait for that. Returns whether it is locked, None if
+    the system has no locks."""
     try:
         import fcntl
     except ImportError:
@@ -141,12 +141,12 @@ def lock(file: IO[bytes], shared: bool = False, wait: bool = False) -> bool | No
 
 
 def parsed_json(text: str | bytes) -> Any:
-    """What a JSON text says, without keys that are given twice, of which the last would hold in silence.
+    """The value of a JSON text; keys that are given twice are refused, as the last one would count without a notice.
 
     Raises
     ------
     ValueError
-        It is no JSON, or has such a key.
+        The text is no JSON, or has a key twice.
     """
 
     def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -164,9 +164,9 @@ def parsed_json(text: str | bytes) -> Any:
 
 
 def read_dataset(path: Path | str) -> Any:
-    """The Dataset or DataTree in a netCDF file, in memory; its checksum is compared before HDF5 sees it.
+    """The Dataset or DataTree in a netCDF file, in memory; its checksum is compared before HDF5 reads it.
 
-    One without a checksum, which another program wrote, is `UNCHECKED`: it is read if a process of its own can read it.
+    A file without a checksum, which another program has written, is `UNCHECKED`; it is read if a separate process can read it.
 
     Raises
     ------
@@ -186,7 +186,7 @@ def _in_memory(path: Path, content: bytes) -> Any:
         with xarray.open_datatree(io.BytesIO(content), engine="h5netcdf", phony_dims="access") as tree:
             variables = [variable for node in tree.subtree for variable in node.variables.values()]
             size = float(sum(variable.nbytes for variable in variables))
-            check_memory(str(path), size, "its arrays")  # which may be larger than the file
+            check_memory(str(path), size, "its arrays")  # these may be larger than the file
             for variable in variables:  # not `tree.load()`, which leaves one lazy that has the name of a child of the root
                 variable.load()
     except ParameterError:
@@ -197,12 +197,12 @@ def _in_memory(path: Path, content: bytes) -> Any:
         said = next(iter(str(error).splitlines()), "") or type(error).__name__
         raise ParameterError(f"{path} is no netCDF file that can be read ({said:.80})") from error
     for node in tree.subtree:
-        node.set_close(None)  # it is closed, and what it came from need not travel with it
+        node.set_close(None)  # the file is closed, and a handle to it need not be sent to other processes
     return tree if tree.children else tree.to_dataset()
 
 
 def _check_links(path: Path, content: bytes) -> None:
-    """Refuse a file that would take minutes to open, or for ever, as one with a group inside itself; links to other files too."""
+    """Refuse a file that would take minutes or for ever to open, such as one with a group inside itself, or has links outside."""
     import h5py
 
     with h5py.File(io.BytesIO(content)) as file:
@@ -224,9 +224,9 @@ def _check_links(path: Path, content: bytes) -> None:
 
 
 def _read_elsewhere(path: Path, content: bytes) -> Any:
-    """What `_in_memory` gives, read by a process of its own: bytes made to stop HDF5, or to keep it for ever, stop only that one.
+    """The result of `_in_memory` in a separate process: bytes that crash HDF5, or keep it busy for ever, stop only that process.
 
-    It serves all files that this process reads, as it takes most of a second to begin.
+    The process serves all files that this one reads, as it takes most of a second to start.
     """
     with _reading:
         reader = _readers.get(os.getpid())
@@ -243,7 +243,7 @@ def _read_elsewhere(path: Path, content: bytes) -> Any:
             timed_out = late.finished.is_set()
             what = "HDF5 does not come to the end of it" if timed_out else "it stops the process that reads it"
             raise ParameterError(f"{path} is damaged: {what}; compute it again") from None
-        except BaseException:  # interrupted: its answer is no longer asked for
+        except BaseException:  # after an interruption the answer is not needed any more
             reader.kill()
             raise
         finally:
@@ -253,12 +253,12 @@ def _read_elsewhere(path: Path, content: bytes) -> Any:
     return answer
 
 
-_readers: dict[int, subprocess.Popen[bytes]] = {}  # by the process that reads: one that was forked has its own
+_readers: dict[int, subprocess.Popen[bytes]] = {}  # by the id of the process that asks, as a forked process needs its own
 _reading = threading.Lock()
 
 
 def _begun_reader() -> subprocess.Popen[bytes]:
-    """A process that runs `serve_files` with what this one can import, and ends with it."""
+    """A process that runs `serve_files` with the import path of this process, and ends with it."""
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(place for place in sys.path if place)}
     command = [sys.executable, "-P", "-c", "from saltus.files import serve_files; serve_files()"]
     pipe = subprocess.PIPE
@@ -274,9 +274,9 @@ def _end_reader(reader: subprocess.Popen[bytes]) -> None:
 
 def serve_files() -> None:
     """Read what comes in at the standard input, file after file, until it ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches every process of a terminal; this one ends with the other
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches every process of a terminal; this one ends with its parent
     answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what a library prints is no answer
+    os.dup2(2, 1)  # keeps what a library prints out of the answers
     while True:
         try:
             path, content = pickle.load(sys.stdin.buffer)
@@ -292,7 +292,7 @@ def serve_files() -> None:
 
 @contextlib.contextmanager
 def _without_unraisable() -> Iterator[None]:
-    """Let objects go in silence: a file that h5netcdf could open only half prints a traceback when it is closed."""
+    """Suppress errors of objects that are deleted: a file that h5netcdf has opened only in part prints a traceback then."""
     hook = sys.unraisablehook
     sys.unraisablehook = lambda lost: None
     try:
@@ -310,9 +310,9 @@ def checked_content(path: Path) -> bytes:
         It cannot be read, or its checksum is not that of its bytes.
     """
     try:
-        if path.exists() and not path.is_file():  # a device or a pipe may have no end
+        if path.exists() and not path.is_file():  # reading a device or a pipe may never end
             raise ParameterError(f"{path} is no file that can be read")
-        check_memory(str(path), COPIES * path.stat().st_size, "its bytes")  # a sparse file may have any number of them
+        check_memory(str(path), COPIES * path.stat().st_size, "its bytes")  # a sparse file may have any size
         content = path.read_bytes()
     except OSError as error:
         raise ParameterError(f"{path} cannot be read ({(error.strerror or str(error)).lower()})") from error
@@ -329,7 +329,7 @@ def checked_content(path: Path) -> bytes:
 
 
 def has_checksum(content: bytes) -> bool:
-    """Whether bytes end with a checksum, or with what is left of one."""
+    """Whether bytes end with a checksum or a part of one."""
     end = content[-2 * _END :]
     return HEAD in end or TAIL in end
 

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping
 from typing import Any
 
-MOST_ROWS = 40  # of a table; what is more is counted
+MOST_ROWS = 40  # the most rows of a table; further ones are only counted
 CELL = "style='text-align:left;padding:1px 10px 1px 0;vertical-align:top'"
 
 
@@ -19,7 +19,7 @@ def html_table(title: str, facts: Mapping[str, Any]) -> str:
 
 
 def show_below_cell(figure: Any) -> None:
-    """Show a figure below the cell that makes it, where this is a notebook; elsewhere do nothing."""
+    """In a notebook, show a figure below the cell that makes it; elsewhere do nothing."""
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
     if hasattr(shell, "kernel"):
         picture, notebook = io.BytesIO(), sys.modules["IPython"].display

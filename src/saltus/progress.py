@@ -39,9 +39,9 @@ def show_progress(fraction: float, what: str) -> None:
 
 
 def part_of(progress: Progress, begin: float, end: float, what: str | None = None) -> Progress:
-    """The progress of a part of the work, during which the fraction of all of it grows from `begin` to `end`.
+    """The progress of a part of the work, during which the fraction of the whole work grows from `begin` to `end`.
 
-    `what`, if it is given, names the part whatever its own steps are called.
+    `what`, if it is given, replaces the names that the part gives to its own steps.
     """
 
     def show(fraction: float, step: str) -> object:

@@ -1,4 +1,4 @@
-"""Where a result comes from: the attributes that every dataset of saltus carries, and whether they are those of a system."""
+"""Where a result comes from: the attributes of every dataset of saltus, and the check whether they belong to a system."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from saltus.files import parsed_json
 if TYPE_CHECKING:
     from saltus.systems import System
 
-# Raised whenever the same request gives other numbers than before: a result of another version is not gone on with.
+# Raised whenever the same request gives other numbers than before: results of another version are refused and not continued.
 RESULT_VERSION = 11
 
 
 def provenance(system: System | None = None, *, tol: float | None = None, seed: int | None = None, **more: Any) -> dict[str, Any]:
-    """`saltus_version`, `result_version`, `system` and `equations` (as JSON), `tol` and `seed`, as far as there are such, then
-    whatever else is to be said.
+    """The attributes `saltus_version`, `result_version`, `system` and `equations` (as JSON), `tol` and `seed`, as far as they are
+    given, and further ones.
 
     The system's JSON has its numbers, and `equations` a digest of each part of its equations (`saltus.taylor.equations_of`).
     """
@@ -31,7 +31,7 @@ def provenance(system: System | None = None, *, tol: float | None = None, seed: 
 
 
 def identity(system: System) -> dict[str, Any]:
-    """What `check_provenance` compares: `result_version` and `equations`, for whoever computes a part of a result elsewhere.
+    """The attributes that `check_provenance` compares, `result_version` and `equations`, for parts that are computed elsewhere.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def check_provenance(attributes: Mapping[str, Any], system: System, what: str, r
     Raises
     ------
     ParameterError
-        With what differs: the version, or the part of the equations; and with the `remedy`.
+        The error names the version or the part of the equations that differs, and the `remedy`.
     """
     differ = "; ".join(_differences(attributes, system))
     if differ:

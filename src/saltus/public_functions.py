@@ -1,4 +1,4 @@
-"""The public functions' arguments: each of the kind that its annotation says, or answered by its name before anything begins."""
+"""The arguments of public functions: one that is not of the kind of its annotation is refused by its name at once."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ class Checked(Protocol[P, R]):
     __name__: str
 
     def __call__(self, *given: P.args, **named: P.kwargs) -> R:
-        """What the function gives."""
+        """Call the function."""
 
     def check(self, *given: P.args, **named: P.kwargs) -> None:
-        """Refuse what the function would refuse."""
+        """Refuse the arguments that the function would refuse."""
 
 
 def checked_by(check: Callable[..., object]) -> Callable[[Callable[P, R]], Checked[P, R]]:
@@ -75,7 +75,7 @@ def bound_arguments(function: Callable[..., Any], given: tuple[Any, ...], named:
     Raises
     ------
     ParameterError
-        One is unknown (with the near names), missing, or given twice.
+        An argument is unknown (the error gives similar names), missing, or given twice.
     """
     signature = _signature(function)
     try:
@@ -98,7 +98,7 @@ def answered(function: Callable[P, R]) -> Callable[P, R]:
     def made(bound: inspect.BoundArguments) -> object:
         return function(*bound.args, **bound.kwargs)
 
-    refuses = made if function.__name__ == "__init__" else None  # anything else may compute for long
+    refuses = made if function.__name__ == "__init__" else None  # calling any other function may take long
 
     @functools.wraps(function)
     def call(*given: P.args, **named: P.kwargs) -> R:
@@ -112,7 +112,7 @@ def answered(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def answering(*names: str) -> Callable[[type[T]], type[T]]:
-    """A decorator of classes: the methods of these names, `__init__` among them, answer as public functions do."""
+    """A decorator of classes: the methods of these names, `__init__` included, refuse arguments as public functions do."""
 
     def decorate(cls: type[T]) -> type[T]:
         for name in names:
@@ -127,9 +127,9 @@ def answering(*names: str) -> Callable[[type[T]], type[T]]:
 
 
 def _is_plain(function: Callable[..., Any], given: tuple[Any, ...], named: dict[str, Any]) -> bool:
-    """Whether a call of a method surely fits, told without binding its arguments: all of the very types that are asked for.
+    """Whether a call of a method surely fits, as all arguments have exactly the types of the annotations; a fast test.
 
-    So are systems copied with other numbers, a hundred thousand times in a study.
+    It matters where systems are copied with other numbers, a hundred thousand times in a study.
     """
     places, kinds, others, needed = _plain_kinds(function)
     values = dict(zip(places, given, strict=False)) | named
@@ -149,15 +149,15 @@ def _is_plain(function: Callable[..., Any], given: tuple[Any, ...], named: dict[
 def _plain_kinds(
     function: Callable[..., Any],
 ) -> tuple[tuple[str, ...], dict[str, type | None], type | None, frozenset[str]]:
-    """Of a method: its arguments that may be given by their places, the type of each (None where it has not one alone), that of
-    what `**named` takes, and those that a call needs. Of a function that is no method nothing is plain."""
+    """For `_is_plain`: the positional arguments of a method, the type of each argument (None if it is not a single one), the type
+    of `**named`, and the arguments that a call needs. For other functions, values with which no call is plain."""
     parameters = _signature(function).parameters
     if next(iter(parameters), "") != "self":
         return (), {}, None, frozenset({""})
     simple: dict[Any, type] = {float | None: float, Mapping[str, Any] | None: dict, Any: object, Any | None: object}
     hints = {name: simple.get(hint, hint) for name, hint in _hints(function).items()}
     kinds: dict[str, type | None] = dict.fromkeys(parameters)
-    told_otherwise = (bool, np.ndarray, Callable, Iterable)  # see `fits`
+    told_otherwise = (bool, np.ndarray, Callable, Iterable)  # types for which `fits` has other rules
     kinds |= {name: kind for name, kind in hints.items() if isinstance(kind, type) and kind not in told_otherwise}
     others = object if any(p.kind is p.VAR_KEYWORD for p in parameters.values()) else None
     places = tuple(p.name for p in parameters.values() if p.kind is p.POSITIONAL_OR_KEYWORD)
@@ -170,13 +170,13 @@ def fitting_arguments(
 ) -> inspect.BoundArguments:
     """The arguments of a call by their names, each of the kind that its annotation says.
 
-    What iterators yield comes as tuples, since it could be looked at only once, and a whole number that is a float as an int.
-    What does not fit may be refused by the function's own checks, which `refuses` calls if there is such, as they know more.
+    Iterators are replaced by tuples, as they can be read only once, and floats by ints where whole numbers are asked for. If an
+    argument does not fit, the function's own checks (`refuses`, if given) are tried first, as their sentences say more.
 
     Raises
     ------
     ParameterError
-        One is unknown, missing or of another kind, with its name.
+        An argument is unknown, missing or of another kind; the error has its name.
     """
     bound, hints = bound_arguments(function, given, named), _hints(function)
     for name, value in bound.arguments.items():
@@ -196,7 +196,7 @@ def fitting_arguments(
 
 
 def _misfit(value: Any, hint: Any, limited: bool) -> str | None:
-    """What a value must be and is not, if that is so; where it is `limited`, its square must be a number."""
+    """What a value must be if it is not of its type, else None; if it is `limited`, its square must not overflow."""
     if not fits(value, hint):
         return in_words(hint)
     limited = limited and hint in (float, float | None) and value is not None
@@ -204,7 +204,7 @@ def _misfit(value: Any, hint: Any, limited: bool) -> str | None:
 
 
 def _refused_in_own_words(refuses: Callable[..., object], bound: inspect.BoundArguments) -> None:
-    """Call what refuses a call; of its errors the sentences of saltus go on."""
+    """Call the function's own checks; errors of saltus are raised, all others are ignored."""
     try:
         refuses(bound)
     except SaltusError:
@@ -215,7 +215,7 @@ def _refused_in_own_words(refuses: Callable[..., object], bound: inspect.BoundAr
 
 @functools.cache
 def _hints(function: Callable[..., Any]) -> dict[str, Any]:
-    """The types that a function's annotations stand for; its `**named` it checks itself, as their names may be wrong."""
+    """The types of a function's annotations, without `**named`, which the function checks itself, as names may be wrong."""
     names = _Names(inspect.unwrap(function).__globals__)
     checked = (p for p in _signature(function).parameters.values() if p.kind is not p.VAR_KEYWORD)
     written = {p.name: p.annotation for p in checked if p.annotation is not p.empty}
@@ -226,7 +226,7 @@ _signature = functools.cache(inspect.signature)
 
 
 class _NamedOnly(type):
-    """A class that is known by its name, as the type checker alone imports it."""
+    """A class of which only the name is known, as it is imported for the type checker only."""
 
     def __getattr__(cls, name: str) -> type:
         if name.startswith("__"):
@@ -245,7 +245,7 @@ class _Names(dict[str, Any]):
 
 
 def fits(value: Any, hint: Any) -> bool:
-    """Whether a value is of a type; of what cannot be told it is."""
+    """Whether a value is of a type; True if that cannot be decided."""
     kind, parts = typing.get_origin(hint) or hint, typing.get_args(hint)
     if kind in (Any, object):
         return True
@@ -271,7 +271,7 @@ def fits(value: Any, hint: Any) -> bool:
 
 
 def _is_iterable_of(value: Any, part: Any) -> bool:
-    """Whether a value can be gone through and what it yields is of a type; an array yields what its first entry is."""
+    """Whether a value is iterable and its entries are of a type; of an array only the first entry is looked at."""
     if isinstance(value, (bytes, Mapping)) or (isinstance(value, str) and part is not str):
         return False
     if part is float and not isinstance(value, (set, frozenset)):
@@ -290,7 +290,7 @@ def _is_numeric(value: Any) -> bool:
 
 
 def _is_small(value: Any) -> bool:
-    """Whether the finite ones of numbers can be squared."""
+    """Whether the squares of all finite numbers among these are finite."""
     try:
         array = np.abs(np.asarray(value, dtype=float))
     except (TypeError, ValueError, OverflowError):  # arrays of several shapes, or a whole number beyond all floats
@@ -299,7 +299,7 @@ def _is_small(value: Any) -> bool:
 
 
 def _can_be_called(value: Any, arguments: Any) -> bool:
-    """Whether a value is a function that takes so many arguments, as far as it tells."""
+    """Whether a value is a function that takes so many arguments; True if its signature is unknown."""
     if not callable(value) or isinstance(value, type):
         return False
     try:
@@ -322,7 +322,7 @@ WORDS: dict[Any, str] = {
     dict: "a dict",
     type(None): "None",
 }
-SOURCES = {  # what gives an object of a class
+SOURCES = {  # where a user gets an object of a class from
     "PeriodicOrbit": "find_orbit or search_orbits",
     "SpecialPoint": "branch.special",
     "Attractors": "find_attractors",
@@ -330,7 +330,7 @@ SOURCES = {  # what gives an object of a class
 
 
 def in_words(hint: Any) -> str:
-    """A type as a sentence names it."""
+    """A type in words, as part of a sentence."""
     kind, parts = typing.get_origin(hint) or hint, typing.get_args(hint)
     if kind is Annotated:
         return str(hint.__metadata__[0])

@@ -1,4 +1,4 @@
-"""What all results have in common: a dataset, of which pictures, files and tables are made, and their facts in a notebook."""
+"""The base class of all results: a dataset, from which pictures, files and tables are made, and their facts in a notebook."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
     from saltus.systems import System
 
-MOST_ENTRIES = 6  # of an array that is shown in a table
+MOST_ENTRIES = 6  # the most entries of an array that is shown in a table
 
 
 class Result:
-    """What a public function gives back: `to_xarray` is its dataset, which `saltus.plot` draws and `saltus.to_mat` writes."""
+    """The result of a public function: `to_xarray` gives its dataset, which `saltus.plot` draws and `saltus.to_mat` writes."""
 
     def to_xarray(self) -> Any:
-        """The result as a Dataset, or a DataTree, whose attribute `kind` says of what."""
+        """The result as a Dataset or a DataTree, whose attribute `kind` says which result it is."""
         raise NotImplementedError
 
     def to_pandas(self) -> pandas.DataFrame:

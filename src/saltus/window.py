@@ -12,13 +12,13 @@ from saltus.errors import ParameterError, shown
 if TYPE_CHECKING:
     from saltus.systems import System
 
-HALF_WIDTH = 1.5  # of the window that is taken where none is given: about the size of the motions that the paper shows
+HALF_WIDTH = 1.5  # the half width of the default window: about the size of the motions in the paper
 
 Box = tuple[tuple[float, float], ...]  # bounds of each coordinate, then of each velocity
 
 
 class Window(Box):
-    """A box of the state space by the bounds of each coordinate, then of each velocity; of one coordinate it is a rectangle."""
+    """A box of the state space: the bounds of each coordinate, then of each velocity; a rectangle for one coordinate."""
 
     __slots__ = ()
 
@@ -38,15 +38,15 @@ class Window(Box):
 
 
 def check_window(window: Any, system: System) -> Window:
-    """A window of the states; for None that of half widths 1.5 around the contact, or around 0 without one.
+    """A window of the states; for None the default window, with half widths 1.5 around the contact, or around 0 without one.
 
-    With several contacts that is as much of it as the contacts leave. Of several coordinates bounds may be equal: that state
-    variable then has one value.
+    With several contacts the default window ends at these. With several coordinates both bounds of a state variable may be equal;
+    it then has one value.
 
     Raises
     ------
     ParameterError
-        What is no pair of bounds for each coordinate and each velocity, or lies beyond the contacts.
+        Anything but a pair of bounds for each coordinate and each velocity; a window beyond the contacts.
     """
     names = system.model.coordinates
     if window is None:
@@ -71,7 +71,7 @@ def check_window(window: Any, system: System) -> Window:
 
 
 def _default_window(system: System) -> Window:
-    """Half widths 1.5 around the contact, or around 0 without one, as far as contacts leave room."""
+    """The window with half widths 1.5 around the contact, or around 0 without one, cut off at the contacts."""
     model = system.model
     if model.sides:
         middle = float(model.contact)

@@ -12,6 +12,7 @@ from shared_systems import forced, steady, walled
 
 from saltus.attractors import basins_of_attraction
 from saltus.attractors.basins.basin_cells import Grid, cell_arguments, cells
+from saltus.attractors.basins.grid import _relabelled
 from saltus.attractors.basins.labelling import Labelling
 from saltus.attractors.find import Attractors, find_attractors
 from saltus.errors import ParameterError
@@ -62,6 +63,12 @@ def test_an_attractor_that_was_not_known_gets_a_label_after_the_others(found: At
     assert np.array_equal(again["label"].values == 2, picture["label"].values == 2)
     assert np.array_equal(again["label"].values == 3, picture["label"].values == 1)
     assert np.array_equal(again["time"].values, picture["time"].values)
+
+
+def test_a_second_state_of_rest_has_a_label_of_its_own() -> None:
+    """As models with several contacts may have several; the first one has the label of rest, whatever else is known."""
+    (rest,) = (member for member in find_attractors(steady(-0.5), starts=8) if member.label == 0)
+    assert [_relabelled([rest], known)[0].label for known in ([], [1, 2], [0], [0, 1])] == [0, 0, 1, 2]
 
 
 def test_a_cell_on_an_attractor_has_reached_it(found: Attractors) -> None:

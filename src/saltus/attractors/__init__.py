@@ -1,4 +1,4 @@
-"""Where it ends: verdicts on motions and their Lyapunov exponents, the set of attractors, their basins and what parts them."""
+"""Where motions end: verdicts and Lyapunov exponents of motions, the attractors, their basins and the curves between these."""
 
 from saltus._front_door import front_door
 

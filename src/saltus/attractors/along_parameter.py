@@ -1,4 +1,4 @@
-"""Attractors along a parameter: found at every value, continued from one to the next, each with an identity of its own."""
+"""Attractors along a parameter: found at every value, and recognised from one value to the next."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 class MatchingSettings:
     """The numbers by which an attractor is recognised at the next value of the parameter."""
 
-    threshold: float = 0.3  # Two sets may be one attractor if their distance, relative to their size, is at most this threshold.
+    threshold: float = 0.3  # Two sets may be one attractor if their distance, relative to their size, is below this threshold.
     other_period: float = 0.5  # A factor of the threshold for orbits of different periods, as across a period doubling.
-    led: float = 3.0  # A factor of the threshold for orbits of the same period, where motions from one settle on the other.
+    led: float = 3.0  # A factor of the threshold for orbits of the same period, if motions from one settle on the other.
     seeds: int = 64  # Number of states of each attractor from which motions start at the next value.
-    # The share of the states of a sampled set that must be near the other set: not all are, as both are random samples.
+    # The share of the states of a sampled set that must be near the other set; some may not be, as both are random samples.
     share: float = 0.95
 
 
@@ -54,11 +54,11 @@ def attractors_along(
     """The attractors at each value of a parameter, with labels that an attractor keeps as the parameter changes.
 
     At each value they are found by `find_attractors`, from the same initial states and from states of the attractors at the
-    value before, so that none is lost because its basin is small. Those at two neighbouring values are then matched, the nearest
-    first: by the distance between the sets of their points at phase 0 (Hausdorff's, the larger of the two ways), relative to the
-    size of the larger set. Half the threshold holds between different periods, as across a period doubling; three times as much
-    between two of the same period if motions from all points of the one settle on the other. One that is matched to none is
-    born, or has died. Rest is always 0.
+    value before, so that none is lost because its basin is small. The attractors at two neighbouring values are then matched,
+    the nearest pair first, by the distance between the sets of their points at phase 0 (Hausdorff's), relative to the size of the
+    larger set. Between attractors of different periods, as across a period doubling, the threshold is half as large; between two
+    of the same period it is three times as large if motions from all points of the first settle on the second. An attractor
+    without a match is born, or has died. Rest always has the label 0.
 
     Parameters
     ----------
@@ -67,27 +67,27 @@ def attractors_along(
     path
         Dotted path of the parameter.
     values
-        Of the parameter, increasing or decreasing: identities are kept from each to the next.
+        Values of the parameter, increasing or decreasing; attractors are matched from each to the next.
     window, starts, max_period, seed, tol
         As for `find_attractors`.
     known
-        Branches along the same parameter, whose stable orbits count at every value.
+        Branches along the same parameter, whose stable orbits count as attractors at every value.
     threshold
-        The largest relative distance of one and the same attractor at neighbouring values.
+        The largest relative distance between the states of one attractor at two neighbouring values.
     progress
         Called with the fraction done and what is being done.
 
     Returns
     -------
     xarray.Dataset
-        A Dataset over (value, attractor), nan where it does not exist: `fraction`, `error`, `amplitude`, `largest_...`,
-        `smallest_...`, `period` (0: none), `kind` ("" where it does not exist); over (value): `undecided`; over (event):
-        births and deaths.
+        A Dataset. Over (value, attractor), nan where the attractor does not exist: `fraction`, `error`, `amplitude`,
+        `largest_...`, `smallest_...`, `period` (0: none), `kind` ("" where it does not exist). Over (value): `undecided`. Over
+        (event): births and deaths.
 
     Raises
     ------
     ParameterError
-        A path to no number, values that are not monotonic, and as for `find_attractors`.
+        A path that leads to no number, values that are not monotonic; else as for `find_attractors`.
 
     Examples
     --------
@@ -117,7 +117,7 @@ def attractors_along(
 
 @dataclass
 class _Followed:
-    """The attractors at the values so far, and the identities of each by its label there."""
+    """The attractors at the values so far, and for each value the identities of its attractors by their labels there."""
 
     threshold: float
     dimension: int  # of the states
@@ -131,7 +131,7 @@ class _Followed:
         return np.concatenate([np.empty((0, self.dimension)), *(member.states[-SETTINGS.seeds :] for member in last)])
 
     def add(self, here: Attractors) -> None:
-        """Add the attractors at the next value, found from the seeds too: each goes on as the nearest one before, or is new."""
+        """Add the attractors at the next value: each gets the identity of the nearest one at the value before, or a new one."""
         found: dict[int, int] = {}
         for (old, new), distance in sorted(self._distances(here).items(), key=lambda item: item[1]):
             if distance < self.threshold and new not in found and self.names[-1][old] not in found.values():
@@ -145,7 +145,7 @@ class _Followed:
         self.names.append(found)
 
     def _distances(self, here: Attractors) -> dict[tuple[int, int], float]:
-        """How far each attractor is from each of those before, by their labels."""
+        """The distance of each attractor from each one at the value before, by their labels (old, new)."""
         if not self.rows:
             return {}
         before = self.rows[-1]
@@ -165,9 +165,9 @@ class _Followed:
 
 
 def set_distance(one: Target, other: Target) -> float:
-    """Hausdorff's distance between two sets of points, relative to the size of the larger: its width, or its distance from 0.
+    """Hausdorff's distance between two sets of states, relative to their largest absolute value of a variable.
 
-    Between sampled sets 5 % of the points may lie farther away, as they are points of a random sample.
+    If one of the sets is a sample, 5 % of the states may lie farther away.
     """
     forth, back = other.distance(one.states), one.distance(other.states)
     share = SETTINGS.share if one.dense or other.dense else 1.0
@@ -177,7 +177,8 @@ def set_distance(one: Target, other: Target) -> float:
 
 
 def _apart(old: Attractor, new: Attractor, led: bool) -> float:
-    """The distance of two attractors, larger for different periods, and smaller where motions from one settle on the other."""
+    """The distance of two attractors, scaled up for different periods, and down where motions from the old one settle on the new
+    one."""
     if AttractorKind.REST in (old.kind, new.kind):
         return set_distance(old.target, new.target) if old.kind == new.kind else np.inf
     distance = set_distance(old.target, new.target)

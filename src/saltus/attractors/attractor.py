@@ -1,4 +1,4 @@
-"""An attractor of the stroboscopic map: what it is, where it lies, and how many motions end there."""
+"""An attractor of the stroboscopic map: its kind, its states, and the share of motions that end on it."""
 
 from __future__ import annotations
 
@@ -19,14 +19,15 @@ from saltus.window import Window
 if TYPE_CHECKING:
     import xarray
 
-UNDECIDED = -1  # the label of what ends on no known attractor
+UNDECIDED = -1  # the label of motions that end on no known attractor
 REST = 0  # the label of rest at the contact, always
 SAME_STATE = 1e-6  # two states at phase 0 this near to one another count as one, relative to their size or to 1
 
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """Where an attractor meets the stroboscopic section, phase 0 of the load: all states of an orbit, many of a chaotic set."""
+    """The states of an attractor on the stroboscopic section, phase 0 of the load: all states of an orbit, or a sample of a set
+    that does not repeat."""
 
     label: int
     kind: AttractorKind
@@ -45,14 +46,15 @@ class Target:
 
     @cached_property
     def grain(self) -> float:
-        """The distance within which a point counts as one of a sampled set: twice what 95 % of its own keep to."""
+        """The distance within which a state counts as one of a sampled set: twice the distance within which 95 % of the sample
+        have a neighbour; 0 for other sets."""
         if not self.dense:
             return 0.0
         apart, _ = self._tree.query(self.states, k=2, p=np.inf)
         return float(2.0 * np.quantile(apart[:, 1], 0.95))
 
     def distance(self, points: np.ndarray) -> np.ndarray:
-        """How far states (..., d) are from the nearest of its own, by their largest difference in a variable, (...)."""
+        """The distances of states (..., d) from the attractor's nearest state, as the largest difference of a variable, (...)."""
         if self.dense:
             finite = np.isfinite(points).all(axis=-1)
             apart, _ = self._tree.query(np.where(finite[..., None], points, 0.0), p=np.inf)
@@ -63,7 +65,7 @@ class Target:
         return distance
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON takes it."""
+        """A dictionary that can be written as JSON."""
         return {"label": self.label, "kind": str(self.kind), "states": self.states.tolist()}
 
     @classmethod
@@ -79,21 +81,21 @@ class Attractor:
     Attributes
     ----------
     target
-        Its label, its kind and the states at which it meets phase 0 of the load.
+        Its label, its kind and its states at phase 0 of the load.
     highest
-        The largest coordinate on it; with several the largest of all.
+        The largest coordinate on it; with several coordinates the largest of all.
     lowest
-        The smallest one.
+        The smallest coordinate on it.
     orbit
-        The orbit of a periodic one, solved by its own equations and stable by its multipliers; else None.
+        The orbit if it is periodic, solved by its own equations and stable by its multipliers; else None.
     starts
-        How many of the initial states end there.
+        The number of initial states whose motions end there.
     of
-        The number of initial states in all.
+        The number of all initial states.
     mirror
-        The label of its mirror image: its own where it is symmetric, UNDECIDED where the system has no mirror.
+        The label of its mirror image: its own if it is symmetric, UNDECIDED if the system has no mirror symmetry.
     evidence
-        Why it is believed to be what it is.
+        The evidence for its kind.
 
     Examples
     --------
@@ -128,7 +130,7 @@ class Attractor:
 
     @property
     def period(self) -> int:
-        """Forcing periods after which it repeats; 0 for rest and for what does not repeat."""
+        """Forcing periods after which it repeats; 0 for rest and for sets that do not repeat."""
         return 0 if self.orbit is None else self.orbit.period
 
     @property
@@ -145,7 +147,8 @@ class Attractor:
     def error(self) -> float:
         """The binomial standard error of the fraction, sqrt(p (1 - p) / n).
 
-        It is 0 where none or all of n starts end there; the share is then within 3 / n of it with a probability of 95 %.
+        It is 0 if none or all of n starts end there; the true share then differs from p by less than 3 / n with a probability of
+        95 %.
         """
         return math.sqrt(self.fraction * (1.0 - self.fraction) / self.of) if self.of else math.nan
 
@@ -181,9 +184,9 @@ class Attractors(Result):
     states
         (n, d): the initial states that were sampled.
     assigned
-        (n,): the label of the attractor on which each ends, or UNDECIDED.
+        (n,): the label of the attractor on which the motion from each of these ends, or UNDECIDED.
     carried
-        (k,): the same of the further states that were given.
+        (k,): these labels for the further states that were given as `also`.
     window
         The window of the initial states.
     seed
@@ -236,7 +239,7 @@ class Attractors(Result):
 
     @property
     def undecided(self) -> int:
-        """How many of the initial states end on none of them, as far as they were followed."""
+        """The number of initial states whose motions end on none of the attractors, as far as they were followed."""
         return int((self.assigned == UNDECIDED).sum())
 
     @property

@@ -21,7 +21,7 @@ MOST_STATES = 64  # states at phase 0 that are written of each attractor
 
 
 def attractors_dataset(found: Attractors) -> xarray.Dataset:
-    """The table of the attractors, with their states at phase 0 and the initial states with the labels where they end."""
+    """The table of the attractors, with their states at phase 0, and the initial states with the labels of their ends."""
     import xarray
 
     table = attractor_table(found.members, found.system)
@@ -54,7 +54,7 @@ def about(system: System, kind: str, **numbers: Any) -> dict[str, Any]:
 
 
 def state_units(system: System) -> dict[str, str]:
-    """The units of the state variables by their names; times are dimensionless, so that velocities have those of coordinates."""
+    """The units of the state variables by their names; as time is dimensionless, a velocity has the unit of its coordinate."""
     names = system.model.coordinates
     return dict(zip(state_names(names), 2 * [system.model.unit_of(name) for name in names], strict=True))
 
@@ -71,7 +71,7 @@ def labels(members: Iterable[Attractor]) -> Any:
 
 
 def attractor_columns(system: System) -> dict[str, tuple[str, str, str]]:
-    """The numbers that a table holds of each attractor: by their names in it the property of `Attractor`, unit and text."""
+    """The columns of a table of attractors by their names: the property of `Attractor`, the unit and the text of each."""
     names, unit = system.model.coordinates, system.model.unit_of(system.model.coordinates[0])
     high, low = extrema_names(names)
     name = names[0] if len(names) == 1 else "any coordinate"
@@ -86,7 +86,7 @@ def attractor_columns(system: System) -> dict[str, tuple[str, str, str]]:
 
 
 def attractor_table(members: tuple[Attractor, ...], system: System) -> dict[str, Any]:
-    """Variables over (attractor,) and, of the states at phase 0, over (attractor, state)."""
+    """The variables over (attractor,), and those of the states at phase 0 over (attractor, state)."""
     most = max([1, *(min(len(m.states), MOST_STATES) for m in members)])
     states = np.full((len(members), most, system.dimension), np.nan)
     for row, member in zip(states, members, strict=True):

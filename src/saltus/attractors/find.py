@@ -29,8 +29,8 @@ class FindAttractorsSettings:
 
     first: int = 400  # All motions are followed for this many forcing periods.
     second: int = 4000  # Those that have not settled by then are followed for this many more.
-    kept: int = 256  # Number of last stroboscopic states that are kept of a motion, to compare them with sets that do not repeat.
-    verdicts: int = 8  # The largest number of motions that are classified because they never settle: each takes seconds.
+    kept: int = 256  # Number of last stroboscopic states of a motion that are compared with attractors that do not repeat.
+    verdicts: int = 8  # The largest number of unsettled motions that are classified, as each takes seconds.
 
 
 SETTINGS = FindAttractorsSettings()
@@ -64,33 +64,34 @@ def find_attractors(
     tol: float = 1e-11,
     progress: Progress = silent,
 ) -> Attractors:
-    """The attractors on which motions from a window of initial states at phase 0 end, each certified, with its share of them.
+    """The attractors on which motions from a window of initial states at phase 0 end, each certified, with its share of the
+    motions.
 
     Rest is certified by proof (`capture_speed`, or no load that ever pulls); a periodic orbit by its own equations, solved to
-    rounding, with multipliers inside the unit circle; a motion that never settles by the verdict of `classify`, if areas shrink.
-    Motions for which none of these holds are undecided; they are counted, with the reasons. The mirror image of an attractor of a
-    symmetric system is another one, unless it is its own, and is added even where no start leads to it. Under a constant load the
-    equilibria are found, as orbits of period 1.
+    rounding, with multipliers inside the unit circle; a set on which motions never settle by the verdict of `classify`, if areas
+    of states shrink. Other motions are undecided; they are counted, with the reasons. In a symmetric system the mirror image of
+    an attractor is another attractor, unless it is the same set, and is added even if no start leads to it. Under a constant
+    load the equilibria are found, as orbits of period 1.
 
     Parameters
     ----------
     system
         What moves, under a load with a frequency or a constant one.
     window
-        Of the states, ((least, largest coordinate), (least, largest velocity)), covered evenly by initial states; with
-        several coordinates such a pair for each of them, then for each velocity. By default half widths are 1.5 around the
-        contact, or around 0 without one. With several contacts starts take turns in which of them are closed.
+        Bounds of the states, ((least, largest coordinate), (least, largest velocity)), covered evenly by initial states; with
+        several coordinates a pair for each of them, then for each velocity. By default half widths are 1.5 around the contact,
+        or around 0 without one. With several contacts the starts take turns as to which contacts are closed.
     starts
-        How many.
+        The number of initial states.
     max_period
         The longest period of an orbit, at most 16.
     seed
-        Shifts the states.
+        The seed by which the grid of initial states is shifted.
     known
-        Stable orbits, or branches of which those at the system's parameter are taken, that count as attractors too.
+        Orbits, or branches with orbits at the system's parameter, of which the stable ones count as attractors too.
     also
-        Further initial states (n, d), coordinates and velocities, which do not count in the shares; those at a contact that move
-        into it are taken just before the impact.
+        Further initial states (n, d), coordinates and velocities, which do not count in the shares. A state at a contact that
+        moves into it is taken just before the impact.
     tol
         The error of a step, as for `simulate_many`.
     progress
@@ -151,9 +152,10 @@ def _assigned(registry: Registry, states: np.ndarray, max_period: int, tol: floa
 
 
 def final_labels(members: list[Attractor]) -> dict[int, int]:
-    """Labels by those of a registry, the same for the same set: rest, then orbits by period, amplitude and sign, then others.
+    """The final labels by the labels of a registry, in an order that does not depend on the search: rest, then orbits by period,
+    amplitude and sign, then others.
 
-    With several contacts there may be more than one state of rest; 0 is that of the least coordinates.
+    With several contacts there may be more than one state of rest; 0 is the one with the least coordinates.
     """
 
     def rank(member: Attractor) -> tuple[float, ...]:
@@ -169,7 +171,7 @@ def final_labels(members: list[Attractor]) -> dict[int, int]:
 
 
 def _known(system: System, known: Any) -> list[PeriodicOrbit]:
-    """The stable ones of known orbits, and of branches where they are at the system's parameter."""
+    """The stable orbits among those that are known, and among those of known branches at the system's parameter."""
     orbits: list[PeriodicOrbit] = []
     for item in [known] if isinstance(known, (PeriodicOrbit, Branch)) else known:
         if isinstance(item, Branch):

@@ -12,4 +12,4 @@ class AttractorKind(StrEnum):
     PERIODIC = "periodic"
     QUASI_PERIODIC = "quasi-periodic"
     CHAOTIC = "chaotic"
-    UNDECIDED = "undecided"  # of a motion only: the numbers support none of the others
+    UNDECIDED = "undecided"  # for motions only: the numbers bear out none of the others

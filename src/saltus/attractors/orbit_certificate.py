@@ -1,4 +1,4 @@
-"""Certifying that a motion which repeats itself is on an attracting orbit: the orbit's own equations, and direct simulation."""
+"""Certifying that a motion that repeats itself is on an attracting orbit, by the orbit's own equations and by simulation."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from saltus.systems import System
 
 @dataclass(frozen=True)
 class CertificateSettings:
-    """How well an orbit must explain a motion."""
+    """How well an orbit must agree with a motion."""
 
     residual: float = 1e-9  # The largest residual of its equations.
-    # The largest distance from itself after a period of direct simulation, and from the states of the motion.
+    # The largest distance of the orbit from itself after a period of direct simulation, and from the states of the motion.
     defect: float = 1e-6
     slow: float = 1e-3  # The largest distance from the states of a motion that approaches it slowly.
     neutral: float = 1e-9  # A multiplier this near to 1 does not show that an orbit attracts.
@@ -31,15 +31,15 @@ SETTINGS = CertificateSettings()
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """What was found of the orbit under a motion."""
+    """The orbit on which a motion is, as far as one was found, and how near it is."""
 
     orbit: PeriodicOrbit | None
-    distance: float  # between the motion's state and the nearest of the orbit's, at phase 0
-    within: float  # the distance that was asked for
+    distance: float  # between states of the motion and of the orbit at phase 0, the nearest ones
+    within: float  # the largest distance at which the motion counts as being on the orbit
 
     @property
     def doubt(self) -> str | None:
-        """Why the orbit does not explain the motion; None if it does."""
+        """Why the motion is not certified to be on the orbit; None if it is."""
         orbit = self.orbit
         if orbit is None:
             return "Newton's method finds no orbit there"
@@ -78,9 +78,10 @@ class Certificate:
 
 
 def certify(system: System, state: np.ndarray, period: int | None, max_period: int = 16) -> Certificate:
-    """The orbit under a motion with this state (d,) at phase 0, which repeats itself after `period` forcing periods.
+    """The orbit of a motion with this state (d,) at phase 0, which repeats itself after `period` forcing periods.
 
-    Without a period the one of its nearest return within `max_period` is tried, and a motion on its way there may be farther off.
+    Without a period, that of the nearest return within `max_period` is tried; the motion may then be farther from the orbit, as
+    it is still on its way to it.
     """
     later = section_states(system, state[None], period or max_period, tol=1e-12)[0]
     states = np.concatenate([[state], later])
@@ -94,7 +95,7 @@ def certify(system: System, state: np.ndarray, period: int | None, max_period: i
 
 
 def solved_orbit(system: System, state: np.ndarray, period: int, admissible: bool = True) -> PeriodicOrbit | None:
-    """The orbit that a motion from a state (d,) at phase 0 follows over so many periods, if one solves its equations there."""
+    """The orbit of this period near a motion from a state (d,) at phase 0; None if Newton's method finds none."""
     try:
         orbit = orbit_from(problem_of(system, Signature((), 1)), start_at(system, state), period)
     except MotionError:
@@ -103,7 +104,7 @@ def solved_orbit(system: System, state: np.ndarray, period: int, admissible: boo
 
 
 def stays_at_rest(system: System, state: np.ndarray) -> bool:
-    """Whether contacts or frictions hold a state (d,) over a whole forcing period, and so, as the load repeats, for good."""
+    """Whether contacts or frictions hold a state (d,) at rest over a whole forcing period; it then stays, as the load repeats."""
     if not system.model.held:
         return False
     motion = simulate(system, **start_at(system, state), periods=1, dense=False)

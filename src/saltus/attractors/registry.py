@@ -22,9 +22,9 @@ class RegistrySettings:
     """The numbers by which motions are assigned to attractors."""
 
     sample: int = 2048  # Number of stroboscopic states that represent a set that does not repeat.
-    last: int = 64  # A motion belongs to such a set if this many of its last states lie on it, in the median.
+    last: int = 64  # A motion belongs to such a set if the median distance of this many of its last states from it is small.
     verdict_periods: int = 4000  # Number of forcing periods for which `classify` may follow a motion that does not settle.
-    # Areas of the state plane do not shrink where the sum of the exponents is above minus this: then nothing attracts.
+    # If the sum of the exponents is above minus this, areas of the state plane do not shrink, and the set attracts nothing.
     lossless: float = 1e-6
     # The largest distance, in units of SAME_STATE, between an orbit and the states of the motions that settle on it.
     beside: float = 100.0
@@ -91,7 +91,8 @@ class Registry:
         return int(NoLabel.FAILED)
 
     def _rest_state(self, last: np.ndarray) -> np.ndarray:
-        """Where a motion rests whose last state is this: at the contact, or, with several, just there."""
+        """The state in which a motion with this last state rests: the contact or, with several contacts or frictions, this
+        state."""
         return last if self.system.model.held else rest_state(self.system)
 
     def add_rest(self, state: np.ndarray) -> int:
@@ -135,7 +136,7 @@ class Registry:
         return None
 
     def assign_unsettled(self, ends: Recurrence, labels: np.ndarray) -> None:
-        """Label motions that have not settled, where they move on a known attractor or within SAME_STATE of one."""
+        """Label the unsettled motions that move on a known sampled attractor, or within SAME_STATE of a known orbit."""
         for i in np.flatnonzero(labels == NoLabel.OPEN):
             last = ends.states[i, -SETTINGS.last :]
             for target in (member.target for member in self.members):

@@ -1,4 +1,4 @@
-"""A share that is known by a sample alone, with its interval."""
+"""The interval of a share that is estimated from a sample."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ DEVIATIONS = 1.96  # standard deviations to each side of a 95 % interval
 
 
 def share_interval(number: int, sample: int) -> tuple[float, float]:
-    """The 95 % interval (Wilson's) of a share of which a sample has so many; nan without a sample."""
+    """The 95 % interval (Wilson's) of a share, of which `number` out of `sample` were found; nan without a sample."""
     if not sample:
         return (math.nan, math.nan)
     share, spread = number / sample, DEVIATIONS**2 / sample

@@ -17,7 +17,7 @@ def with_clock(system: System) -> System:
     Raises
     ------
     ParameterError
-        What is no system, or a load of records, which never repeats.
+        Something that is no system, or a load of records or pulses, which never repeats.
     """
     check_system(system, "the search of attractors", several_contacts=True)
     check_periodic(system)
@@ -27,12 +27,12 @@ def with_clock(system: System) -> System:
 
 
 def check_periodic(system: System) -> None:
-    """Refuse loads by records of samples and by pulses: what goes on for ever under them is not defined.
+    """Refuse loads by records of samples and by pulses, under which motions have no long-term behaviour.
 
     Raises
     ------
     ParameterError
-        With the channel.
+        The load does not repeat; the error names the channel.
     """
     for name, signal in system.load.channels.items():
         if signal.once:
@@ -48,5 +48,5 @@ def is_constant(load: Load) -> bool:
 
 
 def section_states(system: System, states: np.ndarray, periods: float, tol: float = 1e-13) -> np.ndarray:
-    """The states after 1, 2, ... forcing periods from states (n, d) at phase 0, (n, periods, d); of half a period, at its end."""
+    """The states after 1, 2, ... forcing periods from states (n, d) at phase 0, (n, periods, d); or after half a period."""
     return stroboscopic(system, motions_from(system, states, periods=periods, last="all", tol=tol))

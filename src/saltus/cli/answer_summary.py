@@ -1,11 +1,11 @@
-"""What the answer to a study's question comes to, in a few lines."""
+"""A summary of the answer to a study's question, in a few lines."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from typing import Any
 
-MOST_KINDS = 8  # Special points of a branch that are named; the rest are counted.
+MOST_KINDS = 8  # The most special points of a branch that are named; further ones are only counted.
 
 
 def summarise(kind: str, data: Any) -> Iterator[str]:
@@ -60,7 +60,7 @@ def _diagram(tree: Any) -> Iterator[str]:
         special = (branch[name].values for name in ("kind", "special_parameter"))
         kinds = [f"{kind} {value:.6g}" for kind, value in zip(*special, strict=True)]
         more = f" and {len(kinds) - MOST_KINDS} more" if len(kinds) > MOST_KINDS else ""
-        period = int(branch["period"].max())  # where it ends at its own image, the orbit of half the period stands
+        period = int(branch["period"].max())  # at an end at its own image, a branch has the orbit of half the period
         x, listed = branch["parameter"].values, ", ".join(kinds[:MOST_KINDS]) or "no special points"
         yield (
             f"branch {number}: period {period}, {path} {x.min():.6g} to {x.max():.6g}, "

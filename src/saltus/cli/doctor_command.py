@@ -1,4 +1,4 @@
-"""`saltus doctor`: what saltus runs on, and whether it computes what it should there."""
+"""`saltus doctor`: the machine and packages on which saltus runs, and whether it computes correctly there."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from saltus.errors import ParameterError
 if TYPE_CHECKING:
     import numpy as np
 
-PERIODS = 10  # of the trial motion: fifteen impacts, which would show a wrong root or a wrong impact law
-LARGEST_ERROR = 1e-12  # of the trial motion at tol = 1e-14; rounding alone gives some 1e-15 for each impact
+PERIODS = 10  # forcing periods of the trial motion: fifteen impacts, which would show a wrong root or a wrong impact law
+LARGEST_ERROR = 1e-12  # allowed in the trial motion at tol = 1e-14; rounding alone gives some 1e-15 for each impact
 MEBIBYTE = 2.0**20
-DOCUMENTED = (0.22733602, 0.31675834, 0.79736546)  # of default_rng(12345).random(3) in NumPy's documentation of its generators
+DOCUMENTED = (0.22733602, 0.31675834, 0.79736546)  # default_rng(12345).random(3) in NumPy's documentation of its generators
 
 
 def print_doctor() -> None:
-    """Print the machine, the cache and the versions, try what saltus takes for granted of other packages, then a motion with a
-    closed form, alone and in lanes.
+    """Print the machine, the cache and the versions, test what saltus assumes of other packages, then a motion with a closed
+    form, alone and in lanes.
 
-    What is wrong ends the command with one sentence, after all of it is printed.
+    If anything is wrong, the command ends with one sentence about it, after everything is printed.
     """
     console = Console(highlight=False)
     wrong: list[str] = []
@@ -62,7 +62,7 @@ def _machine() -> Block:
 def _cache(wrong: list[str]) -> Block:
     from saltus.taylor import cache_directory
 
-    folder = cache_directory()  # says in a remark why another one is used
+    folder = cache_directory()  # warns if another folder than the usual one is used, and why
     files = [path for path in folder.rglob("*") if path.is_file()]
     size = sum(path.stat().st_size for path in files) / MEBIBYTE
     kernels = sum(path.suffix == ".py" for path in files)
@@ -92,7 +92,7 @@ def _versions(wrong: list[str]) -> Block:
 
 
 def _requirements(wrong: list[str]) -> Iterator[tuple[str, str, str, str]]:
-    """Each package that saltus needs, or that one of its extras needs and is there."""
+    """Each package that saltus needs, and each installed one that its extras need."""
     from packaging.requirements import Requirement
 
     for text in metadata.requires("saltus") or []:
@@ -112,7 +112,7 @@ def _requirements(wrong: list[str]) -> Iterator[tuple[str, str, str, str]]:
 
 
 def _leaned_on(wrong: list[str]) -> Block:
-    """What other packages do for saltus whose loss would be seen nowhere else, as no error comes of it."""
+    """Tests of what saltus relies on in other packages, if its loss would cause no error elsewhere."""
     trials = {
         "public functions (lazy_loader)": (_answers, "arguments of a wrong kind are not refused"),
         "netCDF files (xarray, h5netcdf, h5py)": (_comes_back, "a dataset does not come back from its file as it was"),
@@ -169,7 +169,7 @@ def _notices(folder: Path) -> bool:
 
 
 def trial_chunk(_: Any, block: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """What the trial of a store computes."""
+    """The function that the trial of a store computes."""
     return {"y": block["x"] ** 2}
 
 
@@ -180,7 +180,7 @@ def _repeats(_: Path) -> bool:
 
 
 def _trial(console: Console, wrong: list[str]) -> Block:
-    """x'' + x = 0 from (0, 1) with a wall at x = 1/2 that gives all velocity back: impacts at pi/6 + 4 pi n / 3."""
+    """The trial motion: x'' + x = 0 from (0, 1) with a wall at x = 1/2 and e = 1, with impacts at pi/6 + 4 pi n / 3."""
     import numpy as np
 
     from saltus.flow import simulate, simulate_many

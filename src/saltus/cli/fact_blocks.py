@@ -1,4 +1,4 @@
-"""The blocks of text that `saltus info` and `saltus doctor` print, and how numbers stand in them."""
+"""The blocks of text that `saltus info` and `saltus doctor` print, and the form of numbers in them."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def block_table(block: Block) -> Table:
 
 
 def number(value: Any) -> str:
-    """Eight digits, which is what a reader compares."""
+    """A number with eight digits, which suffice for comparisons."""
     return f"{float(value):.8g}"
 
 
@@ -48,7 +48,7 @@ def angle(value: Any) -> str:
 
 
 def attempt(formula: Callable[[], str]) -> str:
-    """What a closed form gives, or why it does not apply."""
+    """The result of a closed form, or why it does not apply."""
     try:
         return formula()
     except ParameterError as error:
@@ -56,12 +56,12 @@ def attempt(formula: Callable[[], str]) -> str:
 
 
 def mean_load(load: Load) -> Load:
-    """The constant part of every force: what closed forms for constant loads can be asked about."""
+    """The constant parts of all forces, to which closed forms for constant loads can be applied."""
     return Load(**{name: mean(signal) for name, signal in load.channels.items() if not name.startswith("ground_")})
 
 
 def mean(signal: Signal) -> float:
-    """The constant part of a signal; that of a record is 0."""
+    """The constant part of a signal; 0 for a record."""
     if isinstance(signal, Sum):
         return sum(mean(term) for term in signal.terms)
     return signal.value if isinstance(signal, Constant) else signal.mean if isinstance(signal, Harmonic) else 0.0

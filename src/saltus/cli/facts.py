@@ -1,4 +1,4 @@
-"""What `saltus info` prints of a system: what holds for every model, then the closed forms of its own."""
+"""The facts that `saltus info` prints of a system: those of every model, then the closed forms of this one."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from saltus.cli.fact_blocks import Block, Row, number
 from saltus.cli.model_facts import MODEL_FACTS
 from saltus.systems import Load, System
 
-PHASES = 64  # Instants at which a load is compared with its mirror image: no harmonic below the 32nd can hide between them.
+PHASES = 64  # Instants at which a load is compared with its mirror image: enough to see every harmonic below the 32nd.
 
 
 def describe(system: System, start: float | None = None) -> Iterator[Block]:
@@ -20,7 +20,7 @@ def describe(system: System, start: float | None = None) -> Iterator[Block]:
     Parameters
     ----------
     start
-        The angle, rad, from which the period of a free vibration is wanted.
+        The angle, rad, at which the free vibration starts whose period is given.
     """
     parameters: list[Row] = [(path, number(value)) for path, value in system.parameters.items()]
     yield Block("Parameters", [*parameters, ("impact law", type(system.impact).__name__)])
@@ -58,7 +58,7 @@ def _equal(load: Load, other: Load, shift: float) -> bool:
     span = load.period or max((_end(s) for s in _passing(load)), default=1.0)
     times = span * np.arange(PHASES) / PHASES
     for name in load.channels:
-        order = 2 if name.startswith("ground_") else 0  # of the ground only its acceleration matters
+        order = 2 if name.startswith("ground_") else 0  # for the ground only the acceleration matters
         pairs = ((load, times + shift), (other, times))
         here, there = (np.broadcast_to(x.channels[name].derivative(t, x.frequency, order), times.shape) for x, t in pairs)
         if not np.allclose(here, there, rtol=1e-12, atol=1e-12 * (1 + np.abs(there).max())):

@@ -13,7 +13,7 @@ from saltus.cli.interrupt import INTERRUPTED, INTERRUPTION, interruptible
 from saltus.errors import SaltusError
 
 BAD_INPUT = 2
-LONGEST = 380  # characters of a sentence
+LONGEST = 380  # the most characters of a sentence
 
 
 @contextmanager
@@ -25,7 +25,7 @@ def guarded() -> Iterator[None]:
     except SaltusError as error:
         stop(str(error), BAD_INPUT)
     except KeyboardInterrupt as error:
-        # Python notes an interrupt that leaves an exec of text, and `python -m` then dies of SIGINT; the next exec forgets it.
+        # Python records that an interrupt has left an exec of text, and `python -m` then dies of SIGINT; another exec clears it.
         exec("")
         stop(str(error) or INTERRUPTION, INTERRUPTED)  # a sweep says how to go on
     except BrokenPipeError:  # `saltus info ... | head`: typer ends this quietly
@@ -40,7 +40,7 @@ def guarded() -> Iterator[None]:
 
 
 def shortened(sentence: str) -> str:
-    """A sentence of at most `LONGEST` characters on one line: what is in a file may have any length."""
+    """A sentence on one line, cut to `LONGEST` characters, as texts from a file may have any length."""
     line = " ".join(sentence.split())
     if len(line) <= LONGEST:
         return line

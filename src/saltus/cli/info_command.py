@@ -9,7 +9,7 @@ from rich.console import Console
 from saltus.cli.fact_blocks import block_table
 from saltus.cli.facts import describe
 
-LEAST_START = 1e-6  # rad; below it a free vibration is too small to speak of
+LEAST_START = 1e-6  # rad; smaller angles at the start count as none
 
 
 def print_info(path: Path) -> None:

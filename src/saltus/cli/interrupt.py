@@ -1,4 +1,4 @@
-"""Ctrl-C that is heeded wherever it falls."""
+"""Ctrl-C that ends a command whatever code it interrupts."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from typing import Any, NoReturn
 
 INTERRUPTED = 130  # 128 + SIGINT, as shells have it
 INTERRUPTION = "interrupted; no file was left half-written"
-REMINDER_AFTER = 1.0  # s; ample for the clean-up after an interrupt, and then the next one is due
+REMINDER_AFTER = 1.0  # s; enough for the clean-up after an interrupt, before it is raised again
 
 
 @contextmanager
 def interruptible() -> Iterator[None]:
     """Let SIGINT end the block with a KeyboardInterrupt.
 
-    Python raises one wherever it happens to be, and there it can be lost: a callback from C drops it, and the import of an
-    extension module turns it into an ImportError. So it is raised again until the block ends, and whatever error comes of it
-    is taken for it. A process that ignores SIGINT goes on doing so.
+    Python raises the KeyboardInterrupt in whatever code is running, where it can be lost: a callback from C drops it, and the
+    import of an extension module turns it into an ImportError. So it is raised again until the block ends, and any error that it
+    causes is treated as the interrupt. A process that ignores SIGINT continues to ignore it.
     """
     before = signal.getsignal(signal.SIGINT)
     if before is signal.SIG_IGN or threading.current_thread() is not threading.main_thread():

@@ -23,7 +23,7 @@ from saltus.theory import (
     vibrations,
 )
 
-SMALL_START = 0.1  # rad; the start of the free vibration whose period is given where the study has none
+SMALL_START = 0.1  # rad; the start of the free vibration whose period is given if the study has no start
 
 
 def _metainterface(system: System, start: float | None) -> Iterator[Block]:
@@ -69,7 +69,7 @@ def _vibrations(system: System, model: Metainterface, start: float) -> Block:
 
 
 def _alike(model: Metainterface) -> bool:
-    """Whether the layers are equal where a closed form for k = 1, m = 0 asks for it."""
+    """Whether the layers are equal, as closed forms for k = 1, m = 0 assume."""
     return (model.stiffness_ratio, model.mass_ratio) == (1.0, 0.0)
 
 

@@ -40,7 +40,7 @@ def _state(motion: Motion) -> list[tuple[str, str]]:
 
 
 def _events(motion: Motion) -> list[tuple[str, str]]:
-    if not (motion.system.model.sides or motion.system.model.held):  # nothing to hit
+    if not (motion.system.model.sides or motion.system.model.held):  # a model without contacts and frictions
         return []
     impacts = motion.impacts
     last = (

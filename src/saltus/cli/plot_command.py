@@ -35,7 +35,7 @@ def plot_store(path: Path, output: Path | None) -> None:
 
 
 def _check_sizes(path: Path, data: Any) -> None:
-    """Refuse numbers that no axis can hold, as computing never gives them."""
+    """Refuse numbers that are too large for an axis; computations never give such numbers."""
     import numpy as np
 
     from saltus.checks import LIMITS
@@ -52,7 +52,7 @@ def draw_file(path: Path, stem: Path, data: Any) -> list[Path]:
     Raises
     ------
     ParameterError
-        It is of no kind that has a picture, or cannot be drawn as it.
+        The result is of no kind that has a picture, or its data do not fit its kind.
     """
     from saltus.config import kind_of
     from saltus.files import write_figure
@@ -67,7 +67,7 @@ def draw_file(path: Path, stem: Path, data: Any) -> list[Path]:
             return write_figure(stem, figure_of(DRAWINGS[kind](data)))
     except OSError:
         raise
-    except Exception as error:  # what another program wrote may lack anything, and may hold anything in its place
+    except Exception as error:  # a file of another program may lack anything, or contain anything
         said = "" if isinstance(error, SaltusError) else f"{type(error).__name__}: "
         said += " ".join(str(error).split())
         raise ParameterError(f"{path} says that it is of the kind {kind!r}, but it cannot be drawn ({said:.150})") from None

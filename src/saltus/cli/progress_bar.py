@@ -14,7 +14,7 @@ from saltus.progress import Progress
 
 @contextmanager
 def progress_bar(title: str) -> Iterator[Progress]:
-    """A bar with a clock on a terminal; elsewhere a line on stderr whenever the work comes to another step.
+    """A bar with a clock on a terminal; elsewhere a line on stderr whenever another step of the work begins.
 
     Yields the `progress(fraction, what)` that the work calls; `what` names the step, and after a comma what changes in it.
     """

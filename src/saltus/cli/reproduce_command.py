@@ -10,7 +10,7 @@ from rich.table import Table
 
 
 def reproduce_paper(names: Sequence[str], output: Path, force: bool) -> None:
-    """Reproduce the named parts of the paper, or all, into `output`; print what was made and what became of the claims."""
+    """Reproduce the named parts of the paper, or all, into `output`; print what was made, and the verdicts on the claims."""
     from saltus.cli.progress_bar import progress_bar
     from saltus.paper import FIGURES, HEADINGS, ledger, reproduce, tally, with_summaries
 
@@ -33,7 +33,7 @@ def reproduce_paper(names: Sequence[str], output: Path, force: bool) -> None:
 
 
 def renew_report(output: Path) -> None:
-    """Write the report of the results in `output` anew, computing nothing, and say what is in it."""
+    """Write the report of the results in `output` anew, computing nothing, and print which parts are in it."""
     from saltus.paper import report_from_results
 
     names, console = report_from_results(output), Console(highlight=False)
@@ -51,7 +51,7 @@ def _print_report(console: Console, output: Path) -> None:
 
 
 def list_parts() -> None:
-    """Print the names that `saltus reproduce` takes, each with what it is."""
+    """Print the names that `saltus reproduce` takes, each with its title."""
     from saltus.paper import FIGURES
 
     table = Table(box=None, show_header=False, pad_edge=False)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from saltus.config import Ask, Study
 
 DIAGRAMS = ("response_spectrum", "bifurcation_diagram")
-SWEPT = ("basins", "stability_chart", *DIAGRAMS)  # computed in parts into a store, from which a run that was stopped goes on
+SWEPT = ("basins", "stability_chart", *DIAGRAMS)  # computed in parts into a store, so that a run that was stopped goes on
 
 
 def run_study(path: Path, output: Path | None, plot: bool, scheduler: str | None, fresh: bool = False) -> None:
@@ -56,7 +56,7 @@ def check(study: Study, ask: Ask, output: Path | None) -> None:
     Raises
     ------
     ParameterError
-        An argument without meaning, or in `output`, if it is given, the store of something else.
+        An argument without meaning, or a store of something else in `output`, if that is given.
     """
     function: Any = ask.function
     store = {} if output is None or ask.kind not in SWEPT else {"store": output / f"{ask.kind}.zarr"}
@@ -75,11 +75,11 @@ def check_scheduler(study: Study, scheduler: str) -> None:
         known = "diagrams, [stability_chart] and [basins]"
         raise ParameterError(f"--scheduler is for {known}, of which the study has none; leave it out")
     unused: Any = None
-    next(on_cluster(unused, deque(), scheduler), None)  # connects, and has no chunk to compute
+    next(on_cluster(unused, deque(), scheduler), None)  # connects without computing a chunk
 
 
 def answer(study: Study, ask: Ask, output: Path, plot: bool, scheduler: str | None) -> None:
-    """Compute, write and draw the answer to one question, and print what it comes to."""
+    """Compute, write and draw the answer to one question, and print its summary."""
     from saltus.cli.answer_summary import summarise
     from saltus.cli.progress_bar import progress_bar
 

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SampleSettings:
-    """How densely a motion is written where the study does not say."""
+    """How densely a motion is written if the study does not say it."""
 
-    max_samples: int = 1_000_000  # More would make motion.nc larger than what other programs read at once.
-    per_period: int = 200  # Number of samples of a forcing period where the study gives none.
+    max_samples: int = 1_000_000  # With more samples other programs could not read motion.nc at once.
+    per_period: int = 200  # Number of samples in a forcing period if the study gives none.
     max_dense_periods: int = 20_000  # The dense output of a longer motion takes more memory than a laptop has.
 
 
@@ -68,7 +68,7 @@ def write_motion(motion: Motion, study: Study, output: Path, plot: bool) -> list
 
 
 def long_samples(study: Study) -> Any:
-    """The times at which to keep the states of a motion that is too long for its dense output, or None for a shorter one."""
+    """The times at which states are kept if a motion is too long for dense output; None if it is not."""
     import numpy as np
 
     given, period = study.settings().arguments, study.system.load.period
@@ -80,7 +80,7 @@ def long_samples(study: Study) -> Any:
 
 
 def sample_times(motion: Motion, samples: int | None) -> Any:
-    """Evenly spaced times over a motion, or None for its own choice where that is not too many."""
+    """Evenly spaced times over a motion, or None if the motion's own times are not too many."""
     import numpy as np
 
     period = motion.system.load.period

@@ -17,16 +17,16 @@ from saltus.errors import ParameterError, printable
 if TYPE_CHECKING:
     from saltus.sweep import StoreStatus
 
-SEARCH = "diagram"  # the kind of a store of which nobody knows beforehand how many parts there will be
+SEARCH = "diagram"  # the kind of a store whose number of parts is not known beforehand
 BAR_WIDTH = 40  # columns of the bar
-FAILURES_NAMED = 5  # failed chunks that are named
-LONGEST_KIND = 40  # characters of what a store says that it is
+FAILURES_NAMED = 5  # the most failed chunks that are named
+LONGEST_KIND = 40  # the most characters that are shown of a store's kind
 
 
 def print_status(path: Path, verify: bool = False) -> None:
     """Print how far the sweep in the store at `path` is, from its files alone: it may be running, stopped or killed.
 
-    To `verify` compares every file with its checksum, also of a netCDF file, or of all results in a folder.
+    With `verify`, every file is compared with its checksum; `path` may then also be a netCDF file, or a folder of results.
 
     Raises
     ------
@@ -61,12 +61,12 @@ def print_status(path: Path, verify: bool = False) -> None:
 
 
 def print_verified(path: Path) -> None:
-    """Print of the netCDF file at `path`, or of each result below that folder, whether it is what was written.
+    """Print whether the netCDF file at `path`, or each result below that folder, is still as it was written.
 
     Raises
     ------
     ParameterError
-        With all that is damaged; there is no result at `path`.
+        Damaged results, all of which the error names; or no result at `path`.
     """
     from saltus.files import UNCHECKED, checked_content, has_checksum
     from saltus.sweep import damage, parts_of, status
@@ -120,7 +120,7 @@ def parts(found: Iterable[StoreStatus]) -> Iterator[tuple[str, str]]:
 
 
 def ending(found: StoreStatus) -> str:
-    """Whether the sweep goes on, and how it can be gone on with."""
+    """Whether the sweep is running, and how it can be continued."""
     if found.complete:
         return "The sweep is complete."
     if found.running:
@@ -141,5 +141,5 @@ def size(count: int) -> str:
 
 
 def moment(when: datetime.datetime) -> str:
-    """A time, in the zone of who asks."""
+    """A time, in the local time zone."""
     return when.strftime("%Y-%m-%d %H:%M:%S")

@@ -1,4 +1,4 @@
-"""What a study asks besides a motion: a table for each question, whose keys are the arguments of the functions that answer it."""
+"""The questions of a study besides a motion: a table for each, whose keys are the arguments of the functions that answer it."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ QUESTIONS: dict[str, tuple[str, ...]] = {
     "attractors": ("attractors:find_attractors",),
     "basins": ("attractors:basins_of_attraction",),
     "stability_chart": ("studies:stability_chart", "studies:bordered_chart"),
-}  # The first function that takes all the given keys answers; one with open-ended options hands them to the other.
-NOT_IN_FILES = ("system", "store", "workers", "scheduler")  # they are given by the rest of the file or on the command line
+}  # The first function that takes all the given keys answers; a function with open-ended options passes them to the other.
+NOT_IN_FILES = ("system", "store", "workers", "scheduler")  # these come from the rest of the file or the command line
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,7 +66,7 @@ def keys_of(kind: str, coordinates: tuple[str, ...] = ()) -> dict[str, Reader]:
             reader = reader_of(hints[argument.name])
             if reader is not None and argument.name not in NOT_IN_FILES:
                 lists = reader is read_values_or_number
-                if argument.kind is argument.VAR_KEYWORD:  # of one coordinate alone no number will do
+                if argument.kind is argument.VAR_KEYWORD:  # with one coordinate, values must be lists
                     keys |= dict.fromkeys(coordinates, read_values if lists and len(coordinates) == 1 else reader)
                 else:
                     keys[argument.name] = reader
@@ -74,7 +74,7 @@ def keys_of(kind: str, coordinates: tuple[str, ...] = ()) -> dict[str, Reader]:
 
 
 def _hints(function: Callable[..., Any]) -> dict[str, Any]:
-    """The types of a function's arguments; that of its result may need a module that is not there at run time."""
+    """The types of a function's arguments, without that of its result, which may need a module that is not there at run time."""
     annotations = {argument.name: argument.annotation for argument in inspect.signature(function).parameters.values()}
     return get_type_hints(SimpleNamespace(__annotations__=annotations), globalns=vars(sys.modules[function.__module__]))
 

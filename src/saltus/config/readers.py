@@ -22,11 +22,11 @@ Pair = tuple[float, float]
 ANGLE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(deg|rad|°)\s*")
 SPACED = ("from", "to", "count")
 EXAMPLE = "{ from = 0, to = 0.5, count = 101 }"
-MAX_COUNT = 100_000  # A longer axis is a slip of the pen: a chart of that width takes years.
+MAX_COUNT = 100_000  # The longest axis: a longer one is a typing error, as a chart of that width takes years.
 
 
 def show(value: Any) -> str:
-    """A TOML value as a sentence shows it."""
+    """A TOML value as it is shown in a sentence."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
@@ -172,7 +172,7 @@ def read_paths(value: Any) -> tuple[str, str]:
 
 
 def read_within(reader: Reader, **bounds: Any) -> Reader:
-    """The reader of what `reader` gives, within the bounds of `check_number`."""
+    """A reader of the same values as `reader`, within the bounds of `check_number`."""
 
     def within(value: Any) -> Any:
         number = reader(value)
@@ -185,7 +185,7 @@ def read_within(reader: Reader, **bounds: Any) -> Reader:
 
 
 def read_anything(value: Any) -> Any:
-    """A value that is checked by whoever takes it."""
+    """A value that is checked later, by the function that takes it."""
     return value
 
 
@@ -204,7 +204,7 @@ READERS: dict[Any, Reader] = {
 
 
 def reader_of(hint: Any) -> Reader | None:
-    """How a file gives a value of a type, or None where it cannot; X | None is an X that may be left out."""
+    """The reader of values of a type, or None if a file cannot give such values; X | None is an X that may be left out."""
     kinds = [kind for kind in typing.get_args(hint) if kind is not type(None)]
     return READERS.get(kinds[0] if len(kinds) == 1 and type(None) in typing.get_args(hint) else hint)
 

@@ -1,4 +1,4 @@
-"""Results and studies read back by what their files are, and written for MATLAB."""
+"""Results and studies read back by the kind of their files, and results written for MATLAB."""
 
 from __future__ import annotations
 
@@ -20,16 +20,17 @@ if TYPE_CHECKING:
     from saltus.config.study import Study
 
 PARTIAL = {"basin_cells": "the cells of basins", "diagram": "the parts of a diagram"}  # what stores keep beside a netCDF file
-LONGEST_MATLAB_NAME = 63  # characters that MATLAB takes
+LONGEST_MATLAB_NAME = 63  # the most characters of a name in MATLAB
 
 
 @answered
 def load(path: str | Path) -> xarray.Dataset | xarray.DataTree | Study | System:
-    """What is in a file or a folder that saltus has written, or that describes a study or a system.
+    """The contents of a file or a folder that saltus has written, or that describes a study or a system.
 
-    A result in netCDF (.nc) becomes a Dataset or a DataTree, whose `kind` says of what; the complete store of a sweep (a folder)
-    a Dataset; a study (.toml) a `Study`; a system (.json, of `System.to_json`) a `System`. Orbits of a branch are given by
-    `saltus.orbits.orbits_of(load(...))`. Nothing in a result is run; a study may name Python files with models, and these are.
+    A result in netCDF (.nc) becomes a Dataset or a DataTree, whose attribute `kind` says which result it is; the complete store
+    of a sweep (a folder) a Dataset; a study (.toml) a `Study`; a system (.json, of `System.to_json`) a `System`. The orbits of a
+    branch are given by `saltus.orbits.orbits_of(load(...))`. No code in a result is run; Python files with models that a study
+    names are run.
 
     Parameters
     ----------
@@ -39,7 +40,7 @@ def load(path: str | Path) -> xarray.Dataset | xarray.DataTree | Study | System:
     Raises
     ------
     ParameterError
-        There is no such file, it is of none of these kinds, or it is damaged, in one sentence.
+        There is no such file, it is of none of these kinds, or it is damaged.
 
     Examples
     --------
@@ -69,12 +70,12 @@ def load(path: str | Path) -> xarray.Dataset | xarray.DataTree | Study | System:
 
 
 def open_result(path: Path) -> Any:
-    """The Dataset or DataTree at `path`; nothing in it is run, and its system is not made.
+    """The Dataset or DataTree at `path`; no code in it is run, and its system is not made.
 
     Raises
     ------
     ParameterError
-        No such file, or one that is not of saltus, or is damaged; a sweep that is not complete.
+        No such file, or one that saltus has not written, or is damaged; a sweep that is not complete.
     """
     from saltus.files import read_dataset
 
@@ -97,7 +98,7 @@ def _open_store(path: Path) -> Any:
 
 
 def kind_of(data: Any) -> str:
-    """What a result is, by its attributes; empty where they do not name it."""
+    """The kind of a result by its attributes; empty if they do not name one."""
     return str(data.attrs.get("kind", ""))
 
 
@@ -105,20 +106,20 @@ def kind_of(data: Any) -> str:
 def to_mat(path: str | Path, result: xarray.Dataset | xarray.DataTree | Result) -> Path:
     """Write a result as a MATLAB file (version 5), which `load` of MATLAB and Octave reads; returns its path.
 
-    Each variable and coordinate is an array under its name, in which what MATLAB does not take becomes "_"; texts are cell
-    arrays; `attributes` is a struct, and so is each group of a tree.
+    Each variable and coordinate is an array under its name, in which characters that MATLAB does not take become "_"; texts are
+    cell arrays; `attributes` is a struct, and so is each group of a tree.
 
     Parameters
     ----------
     path
-        Of the file; ".mat" is appended where it has no suffix.
+        The path of the file; ".mat" is appended if it has no suffix.
     result
         A Dataset, a DataTree, or a result with `to_xarray`, such as a motion or a branch.
 
     Raises
     ------
     ParameterError
-        What is no such result; two names that become one.
+        Something that is no such result; two names that become one.
 
     Examples
     --------

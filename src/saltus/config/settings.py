@@ -1,4 +1,4 @@
-"""The [simulate] table: from where, for how long and how accurately a motion is computed."""
+"""The [simulate] table: the start, the duration and the accuracy of a motion."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from saltus.systems import Model, System
 class Settings:
     """How a study is simulated."""
 
-    arguments: dict[str, Any]  # of `saltus.simulate`, except the system
-    samples: int | None = None  # written to motion.nc, evenly spaced
+    arguments: dict[str, Any]  # the arguments of `saltus.simulate`, except the system
+    samples: int | None = None  # the number of evenly spaced samples that are written to motion.nc
 
 
 def read_settings(source: Source, system: System, data: Any) -> Settings:

@@ -16,7 +16,7 @@ from saltus.config.source import Keys, Source
 from saltus.errors import ParameterError
 from saltus.systems import Record, signal_class
 
-RECORD_MEMORY = 20  # bytes that a character of a record takes while it is read, about: text, lines, pairs of numbers
+RECORD_MEMORY = 20  # bytes that a character of a record takes, about, while it is read: as text, in lines, in pairs of numbers
 
 
 def read_load(source: Source, data: Any) -> dict[str, Any]:
@@ -30,7 +30,7 @@ def read_load(source: Source, data: Any) -> dict[str, Any]:
 
 
 def _signal(source: Source, keys: Keys, data: Any) -> Any:
-    """What one channel carries."""
+    """The signal of one channel."""
     if isinstance(data, list) and keys != ("load", "frequency"):
         return [_signal(source, (*keys, str(i)), item) for i, item in enumerate(data)]
     if not isinstance(data, Mapping) or keys == ("load", "frequency"):
@@ -70,7 +70,7 @@ def read_samples(source: Source, keys: Keys, name: str) -> tuple[np.ndarray, np.
     path = source.path.parent / Path(name)
     try:
         found, problem = path.stat(), ""
-        if not stat.S_ISREG(found.st_mode):  # a device or a pipe may have no end
+        if not stat.S_ISREG(found.st_mode):  # reading a device or a pipe may never end
             problem = "is no file"
         elif RECORD_MEMORY * found.st_size > LIMITS.memory * free_memory():
             problem = f"has {found.st_size} bytes, more than fits into the free memory"
@@ -104,7 +104,7 @@ def read_samples(source: Source, keys: Keys, name: str) -> tuple[np.ndarray, np.
 
 
 def _row(line: str) -> tuple[float, float] | None:
-    """The first two numbers of a line, or None; between commas there may be no third, as it may be a decimal comma's rest."""
+    """The first two numbers of a line, or None. With commas there must be exactly two cells, as commas may be decimal ones."""
     separator = next((s for s in ";,\t" if s in line), None)
     cells = [cell.strip().strip('"') for cell in line.split(separator)]
     try:
@@ -112,5 +112,5 @@ def _row(line: str) -> tuple[float, float] | None:
     except ValueError:
         return None
     written = "".join(cells[:2])
-    plain = written.isascii() and "_" not in written  # Python reads 1_0 as ten, and digits of any script
+    plain = written.isascii() and "_" not in written  # Python would read 1_0 as ten, and digits of other scripts
     return (time, value) if plain and math.isfinite(time) and math.isfinite(value) else None

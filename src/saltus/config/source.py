@@ -1,4 +1,4 @@
-"""The text that a study came from, and where in it each key stands."""
+"""The text of a study, and the line of each key in it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from saltus.errors import ParameterError
 
 Keys = tuple[str, ...]
 
-LARGEST = 10_000_000  # bytes of a study: a file that is larger is another one
+LARGEST = 10_000_000  # the most bytes of a study: a larger file is something else
 
 BLANK = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
 BARE = re.compile(r"[^\s,\]\}#=.\"']+")
@@ -23,7 +23,7 @@ STRINGS = re.compile(r'"""(?:\\.|[^\\])*?"{3,5}|' r"'''.*?'{3,5}|" r'"(?:\\.|[^"
 
 @dataclass(frozen=True)
 class Source:
-    """A TOML file: its path, its text and the line of every key, by which a refusal says where."""
+    """A TOML file: its path, its text and the line of every key, with which refusals name the place of an error."""
 
     path: Path
     text: str = ""
@@ -56,7 +56,7 @@ def read_source(path: Path) -> tuple[Source, dict[str, Any]]:
     """
     source = Source(path)
     try:
-        if path.exists() and not (path.is_file() or path.is_dir()):  # a device or a pipe may have no end
+        if path.exists() and not (path.is_file() or path.is_dir()):  # reading a device or a pipe may never end
             source.refuse((), "is no file; give the path of a study in TOML")
         if path.is_file() and path.stat().st_size > LARGEST:
             source.refuse(

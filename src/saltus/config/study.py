@@ -1,4 +1,4 @@
-"""A study: a system, how to simulate it, and what else is asked of it."""
+"""A study: a system, how to simulate it, and the other questions about it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ PARTS = ("model", "load", "impact", "simulate", *QUESTIONS)
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    r"""A system, how to simulate it and what else is asked of it, as a TOML file gives them.
+    r"""A system, how to simulate it and the other questions about it, as a TOML file gives them.
 
     `load_study("study.toml").run()` is `saltus.simulate` with the file's settings.
 
@@ -31,7 +31,7 @@ class Study:
     system
         What is studied.
     simulate
-        The settings of [simulate]; None where the file has none.
+        The settings of [simulate]; None if the file has none.
     asks
         The other questions, in the order of the file.
     source
@@ -52,7 +52,7 @@ class Study:
     source: Source
 
     def settings(self) -> Settings:
-        """`simulate`, refused where the file has none.
+        """The settings of [simulate]; an error if the file has none.
 
         Raises
         ------
@@ -64,7 +64,7 @@ class Study:
         return self.simulate
 
     def run(self, **more: Any) -> Any:
-        """The motion that the study asks for; `more` goes to `saltus.simulate` as it is, in place of the file's own settings.
+        """The motion that the study asks for; `more` is passed to `saltus.simulate` and replaces settings of the file.
 
         Parameters
         ----------
@@ -93,9 +93,9 @@ class Study:
         ask
             The question.
         function
-            What answers it.
+            The function that answers it.
         more
-            Arguments beside those of the file.
+            Arguments besides those of the file.
 
         Raises
         ------
@@ -123,14 +123,14 @@ def load_study(path: Path | str, *, questions: bool = True) -> Study:
     Parameters
     ----------
     path
-        Of the file.
+        The path of the file.
     questions
         Whether the other questions are read, which loads the functions that answer them.
 
     Raises
     ------
     ParameterError
-        Whatever is wrong, in one sentence with the file, the line and the dotted key.
+        An error in the file, in one sentence with the file, the line and the dotted key.
 
     Examples
     --------

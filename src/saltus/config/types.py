@@ -1,4 +1,4 @@
-"""What `type` names: a class that saltus knows, or one of the user's own in a Python file or an installed module."""
+"""The classes that `type` names: a class of saltus, or one of the user's own in a Python file or an installed module."""
 
 from __future__ import annotations
 

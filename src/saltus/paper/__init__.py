@@ -1,4 +1,4 @@
-"""The paper: one file per figure, the tables of claims beside what is measured here, and the report.
+"""The paper: one file per figure, the tables of its claims, what is measured for each of them, and the report.
 
 `reproduce` makes every figure, table and claim that is not up to date; `FIGURES` holds them by name, in the paper's order.
 """

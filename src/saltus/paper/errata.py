@@ -1,4 +1,4 @@
-"""The paper's errata as data: where each is, and what is right."""
+"""The paper's errata as data: the place of each, and the correction."""
 
 from __future__ import annotations
 

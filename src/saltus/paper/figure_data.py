@@ -1,4 +1,4 @@
-"""Datasets that say what they are: units on every variable, and what was computed, with which system, at which accuracy."""
+"""Datasets with units on every variable, and with attributes for what was computed, with which system and accuracy."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ def scalar_dataset(values: Mapping[str, float], *, what: str, **attributes: Any)
 
 
 def largest_angle(ends: xr.Dataset) -> np.ndarray:
-    """The largest abs(theta) of each motion of an ensemble of which extrema were kept, over all the periods that were."""
+    """The largest abs(theta) of each motion of an ensemble, over all periods of which extrema were kept."""
     size = np.maximum(ends["largest_theta"].values, -ends["smallest_theta"].values)
     return np.asarray(size.reshape(len(size), -1).max(axis=1))
 
 
 def scalars(data: Any) -> dict[str, float]:
-    """The numbers of a group of a DataTree that holds nothing else, by name."""
+    """The numbers in a group of a DataTree that contains only single numbers, by name."""
     return {name: float(value) for name, value in data.to_dataset().items()}
 
 

@@ -1,4 +1,4 @@
-"""What the report says first: the findings that change a conclusion of the paper, and where the reduced model may be believed."""
+"""The first page of the report: the findings that change a conclusion of the paper, and where the reduced model is valid."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ BEARS_OUT = (ClaimVerdict.CORRECTED, ClaimVerdict.HOLDS)  # a finding: the state
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """One finding of `highlights.toml` with the claims that bear it out."""
+    """One finding of `highlights.toml`, with the claims that support it."""
 
     title: str
     paper: str  # what the paper concludes
@@ -23,7 +23,7 @@ class Finding:
 
     @property
     def numbers(self) -> str:
-        """What was measured, in the words of the first claim; empty where that has no headline."""
+        """The numbers measured, in the headline of the first claim; empty if it has none."""
         return self.claims[0].headline
 
     @property
@@ -33,7 +33,7 @@ class Finding:
 
 
 def findings(claims: Iterable[Claim]) -> list[Finding]:
-    """The findings whose first claim was judged and of whose claims none contradicts them, in their order."""
+    """The findings whose first claim was judged and none of whose claims contradicts them, in the order of the file."""
     known = {claim.id: claim for claim in claims}
     found = []
     for keys in highlight_tables()["findings"]:

@@ -1,4 +1,4 @@
-"""The panels of the parts of the paper, on all cores: a process for each, shared by all parts; what two show is computed once."""
+"""The panels of all parts of the paper, computed on all cores in one pool of processes; a panel of two parts is computed once."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 
 from saltus.flow import available_cores, share_cores
 
-Panels = Mapping[str, Callable[[], Any]]  # what computes each panel of a part, by the panel's name
+Panels = Mapping[str, Callable[[], Any]]  # the functions that compute the panels of a part, by the panels' names
 Task = tuple[str, str]  # the names of a part and of its panel
 
 
@@ -27,7 +27,7 @@ def compute_panels(parts: Mapping[str, Panels]) -> Iterator[tuple[str, dict[str,
     tuple[str, dict[str, Any], float]
         The name of the part, its panels by name and in their order, and the seconds of processor time that they took.
     """
-    shared: dict[Any, list[Task]] = {}  # by what computes them: a chart of two figures is computed once
+    shared: dict[Any, list[Task]] = {}  # by the function and its arguments: a chart of two figures is computed once
     for part, panels in parts.items():
         for name, make in panels.items():
             shared.setdefault(_what(make), []).append((part, name))
@@ -43,7 +43,7 @@ def compute_panels(parts: Mapping[str, Panels]) -> Iterator[tuple[str, dict[str,
 
 
 def _what(make: Callable[[], Any]) -> Any:
-    """What a function without arguments computes: of a `partial` the function with its arguments, which are plain data."""
+    """A key of what a function computes: for a `partial`, the function and its arguments, which are plain data."""
     return (make.func, repr(make.args), repr(sorted(make.keywords.items()))) if isinstance(make, partial) else make
 
 
@@ -61,7 +61,7 @@ def _results(
         futures = {pool.submit(_counted, make): tasks for make, tasks in work}
         try:
             yield ((futures.pop(future), future.result()) for future in as_completed(list(futures)))
-        except BaseException:  # interrupted, or a panel failed: the others are of no use any more
+        except BaseException:  # after an interruption or a failed panel the others are not needed any more
             _stop(pool)
             raise
 
@@ -83,7 +83,7 @@ _left: list[Any] = []  # in a process of the pool: how many panels are not done
 def _begin(left: Any) -> None:
     """Share the cores with the panels that are left.
 
-    Ctrl-C, which reaches every process of a terminal, is left to the one that knows what to say.
+    Ctrl-C reaches every process of a terminal; it is ignored here, as the main process handles it.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _left[:] = [left]
@@ -91,7 +91,7 @@ def _begin(left: Any) -> None:
 
 
 def _counted(make: Callable[[], Any]) -> tuple[Any, float]:
-    """A panel of the pool; what is left then shares the cores anew."""
+    """Compute a panel of the pool; afterwards the panels that are left share the cores anew."""
     result = _timed(make)
     with _left[0].get_lock():
         _left[0].value -= 1

@@ -15,7 +15,7 @@ FIGURE_FILES = (
 FILES = (*(f"saltus.paper.figures.{name}" for name in FIGURE_FILES), "saltus.paper.sections.statements")
 FIGURES: dict[str, PaperFigure] = {part.name: part for part in (import_module(file).FIGURE for file in FILES)}
 
-# The order in which parts are computed: long panels first, so that no core is left alone with one at the end, and after the first
-# of these what takes a second each, so that its pictures are drawn while others are computed.
+# The order in which parts are computed: long panels first, so that none of them runs alone at the end; after the first of these
+# the parts that take a second each, so that their pictures are drawn while others are computed.
 _LONG = (("both_layers", "quasi", "fig14"), ("fig09", "fig11", "fig15", "fig12", "fig13", "fig10", "smoothing"))
 ORDER = (*_LONG[0], *(name for name in FIGURES if name not in _LONG[0] + _LONG[1]), *_LONG[1])

@@ -1,6 +1,6 @@
 """`make release-check`: every claim of the tables judged at full size, from a folder in which nothing is made yet.
 
-It takes about as long as `saltus reproduce`. The tests of every day judge what is fast, and quick versions of the rest.
+It takes about as long as `saltus reproduce`. The everyday tests judge the claims that are fast, and quick versions of the others.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from saltus.paper.reproduction import reproduce
 
 
 def failures(claims: Iterable[Claim]) -> list[str]:
-    """A line for each claim that disagrees with the paper and its errata, and for each one of the tables that was not judged."""
+    """A line for each claim that fails and has no erratum that holds, and for each claim of the tables that was not judged."""
     found = {claim.id: claim for claim in claims}
     wrong = [f"{id} disagrees: {claim.evidence}" for id, claim in found.items() if claim.verdict is ClaimVerdict.DISAGREES]
     known = [(part, id) for part, entries in claim_tables().items() for id in entries]

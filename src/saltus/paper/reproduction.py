@@ -21,7 +21,7 @@ from saltus.progress import Progress, silent
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MadeFigure:
-    """What became of one name: its files, its claims, and whether it was made anew."""
+    """The result for one name: its files, its claims, and whether it was made anew."""
 
     name: str
     made: bool  # False: it was up to date
@@ -33,14 +33,14 @@ class MadeFigure:
 def reproduce(
     names: Sequence[str] = (), output: Path | str = Path("results"), force: bool = False, progress: Progress = silent
 ) -> list[MadeFigure]:
-    """Compute and draw the named parts of the paper (all where none is named) into `output`, and write the report.
+    """Compute and draw the named parts of the paper (all if none is named) into `output`, and write the report.
 
     What is up to date is left alone unless `force`. An interrupt leaves complete files only, and the next run goes on from there.
 
     Raises
     ------
     ParameterError
-        An unknown name, with the near ones; an output folder that cannot be written to.
+        An unknown name (the error gives similar ones); an output folder that cannot be written to.
     """
     from saltus.paper.parts import FIGURES, ORDER
 
@@ -66,7 +66,7 @@ def _make(figures: Mapping[str, PaperFigure], output: Path, progress: Progress) 
         figure, start = figures[name], time.process_time()
         data = figure.join(made)
         _write(figure, data, output)
-        # From memory, which tests show to be what the file gives back.
+        # The data are taken from memory; tests show that reading the file gives the same.
         claims = figure.claims(data)
         seconds[name] = computing + time.process_time() - start
         state.write(figure, output, claims, seconds[name])

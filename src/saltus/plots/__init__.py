@@ -1,4 +1,4 @@
-"""How it looks: one module per kind of picture, drawn from datasets only, in the conventions of `style`.
+"""Pictures: one module per kind of picture, drawn from datasets only, in the conventions of `style`.
 
 Nothing here computes a motion, and nothing needs a display. A function for a whole result draws into `ax`, or, where it has
 several panels, into `figure`; without one it makes a figure of its own, and it returns the axes. A function for a part of a

@@ -1,4 +1,4 @@
-"""One function that draws any result of saltus, by what it is."""
+"""One function that draws any result of saltus, by its kind."""
 
 from __future__ import annotations
 
@@ -57,20 +57,20 @@ DRAWINGS: dict[str, Callable[..., Any]] = {
 
 
 def plot(result: Any, **options: Any) -> Any:
-    """Draw any result; returns the axes, or of several panels an array of them. In a notebook the picture stands below the cell.
+    """Draw any result; returns the axes, or an array of them for several panels. In a notebook the picture is below the cell.
 
     Parameters
     ----------
     result
-        A Dataset or a DataTree that saltus has made, what has `to_xarray`, such as a motion or a branch, or a tuple of such, as
-        `switch_branch` and `separatrices` give them, which are drawn into the same axes.
+        A Dataset or a DataTree that saltus has made, a result with `to_xarray`, such as a motion or a branch, or a tuple of such
+        results, as `switch_branch` and `separatrices` return them, which are drawn into the same axes.
     options
-        Of the function that draws it, such as `ax=` (or `figure=`, where it has several panels) and `width=`, in mm.
+        Options of the function that draws it, such as `ax=` (or `figure=` for several panels) and `width=`, in mm.
 
     Raises
     ------
     ParameterError
-        What has no picture.
+        A result that has no picture.
 
     Examples
     --------
@@ -100,7 +100,7 @@ def plot(result: Any, **options: Any) -> Any:
 
 
 def _by_content(data: Any) -> Callable[..., Any] | None:
-    """What draws a dataset whose kind is of something else, as that of a curve of special points, or which has none."""
+    """The function that draws a dataset without a `kind`, or with one of another meaning, such as a curve of special points."""
     if "chart" in getattr(data, "children", ()):
         return draw_stability_chart
     if "branches" in getattr(data, "children", ()):

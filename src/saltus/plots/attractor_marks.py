@@ -25,7 +25,7 @@ def attractor_colours(numbers: Sequence[int]) -> dict[int, Any]:
 
 
 def draw_points(ax: Any, dataset: Any, i: int, **style: Any) -> None:
-    """Attractor `i` at phase 0 of the load: large marks where it repeats itself, else some of its points."""
+    """Attractor `i` at phase 0 of the load: large marks if it is periodic, else some of its points."""
     repeats = str(dataset["attractor_kind"].values[i]) in ("rest", "periodic")
     mark = MARK | {"marker": MARKERS[i % len(MARKERS)]} if repeats else POINT
     x, y = (dataset[f"section_{name}"].values[i] for name in dataset.attrs["plane"])
@@ -47,7 +47,7 @@ def steady(dataset: Any) -> bool:
 def attractor_legend(
     ax: Any, own: bool, dataset: Any, colours: dict[int, Any], share: Callable[[int], str], undecided: tuple[str, str] | None
 ) -> None:
-    """What each colour and mark stands for, with `share(i)` of attractor i, and the mark and share of what is undecided."""
+    """A legend of the colours and marks, with `share(i)` of attractor i, and the mark and share of undecided states."""
     handles = []
     for i, (number, colour) in enumerate([*colours.items()][:MOST_NAMED]):
         text = f"{number}: {_kind(dataset, i)}{share(i)}"

@@ -1,4 +1,4 @@
-"""Attractors on the stroboscopic section: where they are at phase 0, and which initial states lead to each."""
+"""Attractors on the stroboscopic section: their states at phase 0, and the initial states that lead to each."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ HALO = [Stroke(linewidth=2.2, foreground="white"), Normal()]  # so that an attra
 
 @drawing
 def draw_attractors(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * SINGLE_COLUMN) -> Axes:
-    """Draw the dataset of attractors that were searched: a dot for each start, a mark for each point at phase 0; returns `ax`."""
+    """Draw the dataset of `find_attractors`: a dot for each start, a mark for each state at phase 0; returns `ax`."""
     x, y = (str(name) for name in dataset.attrs["plane"])
     colours = attractor_colours([int(n) for n in dataset["attractor"].values])
     own, ax = ax is None, axes_or_new(ax, width, 0.82 * width + 4.2 * (len(colours) + 1) // 2)

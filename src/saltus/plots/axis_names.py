@@ -1,4 +1,4 @@
-"""What coordinates and parameters are called on axes; units are those that the variables of a dataset carry."""
+"""The names of coordinates and parameters on axes; units are those of the variables in a dataset."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SAME_AMPLITUDE = 1e-9  # of an amplitude: motions between two walls that reach b
 
 
 def symbol(name: str) -> str:
-    """A state variable's symbol in mathematical text; that of a velocity, of several, is its coordinate's with a dot."""
+    """A state variable's symbol in mathematical text; with several coordinates a velocity's is its coordinate's with a dot."""
     if name.endswith("_velocity"):
         return rf"\dot{{{symbol(name.removesuffix('_velocity'))}}}"
     return SYMBOLS.get(name, name if len(name) == 1 else rf"\mathrm{{{name.replace('_', chr(92) + '_')}}}")
@@ -43,7 +43,7 @@ def unit_in_brackets(variable: Any) -> str:
 
 
 def parameter_name(path: str) -> str:
-    """What a parameter is called on an axis; its dotted path where it has no name."""
+    """The name of a parameter on an axis; its dotted path if it has none."""
     return PARAMETERS.get(path, path)
 
 
@@ -79,7 +79,7 @@ def state_label(dataset: Any, name: str, plane: tuple[str, str], after: str = ""
 
 
 def varied(dataset: Any, dim: str) -> tuple[str, np.ndarray]:
-    """What runs along a dimension of an ensemble, in words with its unit, and its values: a parameter, a start, or numbers."""
+    """The quantity along a dimension of an ensemble, in words with its unit, and its values: a parameter, a start, or numbers."""
     given = [name for name in dataset.variables if "." in str(name) or str(name).startswith(("start_", "initial_"))]
     for name in (dim, *given):
         if name in dataset.variables and dim in dataset[name].dims and dataset[name].dtype.kind in "fi":
@@ -90,7 +90,7 @@ def varied(dataset: Any, dim: str) -> tuple[str, np.ndarray]:
 
 
 def _start_name(dataset: Any, name: str) -> str:
-    """What a start is called on an axis; a parameter or a dimension of the user's own by its name."""
+    """The name of an initial value on an axis; a parameter or another dimension keeps its own name."""
     state = name.removeprefix("start_").removeprefix("initial_")
     if state == name:
         return parameter_name(name)

@@ -1,4 +1,4 @@
-"""A backbone: the free frequency over the amplitude, as it stands among the responses to a load."""
+"""A backbone: the amplitude over the frequency of free orbits, drawn as responses to a load are."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Measures of the boundary of basins: the share of uncertain states, and how near all basins are."""
+"""Measures of the boundary of basins: the share of uncertain states, and the share that lies near all basins."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def draw_uncertainty(dataset: Any, *, ax: Axes | None = None, width: float = SIN
 
 @drawing
 def draw_wada(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
-    """Draw which share of the boundary cells has all basins within a radius, and the shares from which a verdict follows."""
+    """Draw the share of the boundary cells that have all basins within a radius, and the shares from which a verdict follows."""
     ax = axes_or_new(ax, width, 0.75 * width)
     ax.plot(dataset["radius"].values, dataset["share"].values, color=STABLE, marker="o", ms=4.0, lw=0.9, label="boundary cells")
     for name, label in (("agrees", "agrees with Wada above"), ("fails", "does not below")):

@@ -1,4 +1,4 @@
-"""Bands of chaos along a parameter: stroboscopic points of direct simulation, and the exponents that decide."""
+"""Bands of chaos along a parameter: stroboscopic states of simulated motions, and the exponents by which chaos is judged."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ VERDICTS = {"undecided": "x", "chaotic": "o", "transient": "^", "regular": "s"}
 
 @drawing
 def draw_chaotic_bands(tree: Any, *, ax: Axes | None = None, figure: Figure | None = None) -> Any:
-    """Draw the tree of `chaotic_bands`: states at phase 0 above, exponents of what has not settled below; returns both axes.
+    """Draw the tree of `chaotic_bands`: states at phase 0 above, exponents of unsettled motions below; returns both axes.
 
-    Into axes that are given the states at phase 0 alone are drawn.
+    Into given axes only the states at phase 0 are drawn.
     """
     if ax is not None:
         return _draw_states(ax, tree)
@@ -47,7 +47,7 @@ def _draw_states(ax: Axes, tree: Any) -> Axes:
 
 
 def _draw_deciding_exponents(below: Axes, tree: Any) -> list[Any]:
-    """The exponents of what has not settled, with a mark for each verdict; returns what stands for these in a legend."""
+    """The exponents of unsettled motions, with a mark for each verdict; returns the handles of the marks for a legend."""
     below.axhline(0.0, **ZERO)
     draw_bands(below, tree)
     handles = []

@@ -19,11 +19,11 @@ from saltus.plots.conventions import INK, LIMIT, SINGLE_COLUMN, UNSTABLE, axes_o
 from saltus.plots.drawing import drawing
 from saltus.plots.marks import cell_edges
 
-COLOURS = "viridis_r"  # large amplitudes dark, beside the white of rest small ones light
+COLOURS = "viridis_r"  # large amplitudes are dark; small ones are light, as they lie beside the white of rest
 # Steps of the colours of the amplitude, as shares of a round number: finer where amplitudes are small.
 LEVELS = np.array([0.0, 0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0])
-# What is in a cell beside or instead of one motion: fill (None is the colour of its amplitude), hatch, its colour, and in words.
-# Hatches tell them apart without colours.
+# The look of cells with something beside or instead of one motion: fill (None is the colour of the amplitude), hatch, the hatch's
+# colour, and the words of the legend. The hatches differ, so that cells can be told apart without colours.
 FILLINGS: dict[str, tuple[str | None, str, str, str]] = {
     "several_motions": (None, "......", "white", "several motions"),
     "motions_and_chaos": (None, "//////", INK, "chaos beside motions"),
@@ -38,7 +38,7 @@ INSIDE: dict[str, Any] = {"color": "#333333", "lw": 0.4}  # where one motion amo
 WHITE_GROUND = [Stroke(linewidth=2.9, foreground="white"), Normal()]  # so that a line is seen on every colour
 THIN_GROUND = [Stroke(linewidth=1.0, foreground="white", alpha=0.6), Normal()]
 STATIC_LINE: dict[str, Any] = {"color": UNSTABLE, "lw": 1.4}
-PRINTED_LINE: dict[str, Any] = {"color": UNSTABLE, "lw": 1.0, "ls": (0, (1, 1.2))}  # the paper's border where it is not true
+PRINTED_LINE: dict[str, Any] = {"color": UNSTABLE, "lw": 1.0, "ls": (0, (1, 1.2))}  # the paper's border where it is wrong
 LINE_LIMIT: dict[str, Any] = {"color": LIMIT, "lw": 0.9}
 DOT: dict[str, Any] = {"linestyle": "none", "marker": ".", "color": INK, "markersize": 2.0, "markeredgewidth": 0.0}
 CROSS: dict[str, Any] = {"linestyle": "none", "marker": "x", "color": UNSTABLE}
@@ -47,7 +47,7 @@ CLOSED_FORM: dict[str, Any] = {"linestyle": "none", "marker": "o", "mfc": "white
 
 @drawing
 def draw_stability_chart(data: Any, *, ax: Axes | None = None) -> Axes:
-    """Draw a chart as it is stored, or a tree of one with its borders, with its scale and what its marks mean; returns `ax`."""
+    """Draw the Dataset of a chart, or the DataTree of a chart and its borders, with a colour bar and a legend; returns `ax`."""
     chart = data["chart"].to_dataset() if data_is_tree(data) else data
     own, ax = ax is None, axes_or_new(ax, 1.2 * SINGLE_COLUMN, 98.0)
     cells = draw_chart(ax, chart)
@@ -74,7 +74,7 @@ def data_is_tree(data: Any) -> bool:
 
 
 def draw_lines(ax: Any, tree: Any) -> int:
-    """All borders of a tree that holds a chart, those beside rest alone as heavy lines; returns how many dots there are."""
+    """All borders of a tree with a chart, those next to cells with rest alone as heavy lines; returns the number of dots."""
     chart = tree["chart"].to_dataset()
     for curve in border_curves(tree):
         x, y, style = curve["horizontal"].values, curve["vertical"].values, BORDERS[str(curve.attrs["kind"])]
@@ -88,7 +88,7 @@ def draw_lines(ax: Any, tree: Any) -> int:
 
 
 def _is_beside_rest(chart: Any, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Whether there is a cell with rest alone among the four about each of these points, and one with something else."""
+    """Whether, among the four cells about each of these points, one has rest alone and one has something else."""
     resting = _resting(chart)
     columns, rows = (
         np.interp(values, chart[name].values, np.arange(chart.sizes[name]))
@@ -108,9 +108,9 @@ def _resting(chart: Any) -> np.ndarray:
 
 
 def draw_chart(ax: Any, chart: Any, top: float | None = None) -> Any:
-    """The cells: coloured by the largest amplitude, or where `has_speeds` by the largest of the least speeds of impacts, filled
-    and hatched where there is something else (`FILLINGS`), white where there is nothing but rest; crosses where the largest
-    motion goes beyond the kinematic limit.
+    """The cells: coloured by the largest amplitude (or, if `has_speeds`, by the largest of the motions' least impact speeds),
+    filled and hatched if there is something else (`FILLINGS`), white if there is rest alone; crosses where the largest motion
+    goes beyond the kinematic limit.
 
     Returns what a colour bar needs, or None.
     """
@@ -139,14 +139,14 @@ def draw_chart(ax: Any, chart: Any, top: float | None = None) -> Any:
 
 
 def has_speeds(chart: Any) -> bool:
-    """Whether the motions of most cells have the same amplitude, as between two walls, so that speeds of impacts are drawn."""
+    """Whether the motions of most cells have the same amplitude, as between two walls, so that impact speeds are drawn."""
     amplitudes = chart["amplitude"].values
     known = "motion_slowest" in chart and float(chart["motion_slowest"].max()) > 0.0
     return known and is_flat(amplitudes[np.isfinite(amplitudes)])
 
 
 def with_outcome(chart: Any, name: str) -> np.ndarray:
-    """The cells of a chart in which there is what one of `flag_meanings` says, (vertical, horizontal)."""
+    """Which cells of a chart have the outcome with this name in `flag_meanings`, (vertical, horizontal)."""
     outcome = chart["outcome"].transpose("vertical", "horizontal")
     number = dict(zip(outcome.attrs["flag_meanings"].split(), np.ravel(outcome.attrs["flag_values"]), strict=True))[name]
     return np.asarray(outcome.values == number)
@@ -185,7 +185,7 @@ def _outline(ax: Any, x: np.ndarray, y: np.ndarray, where: np.ndarray) -> None:
 
 
 def draw_static(ax: Any, static: Any) -> None:
-    """The quasi-static border in red: solid where it is the true one, dotted the part of the paper's that is not."""
+    """The quasi-static border in red: the true one solid, the part of the paper's border that is wrong dotted."""
     vertical, critical, true = (static[name].values for name in ("vertical", "critical", "true"))
     last = max(int(np.argmax(true > 0)) - 1, 0)  # where the border reaches Hhat = 0; below it there is none
     ax.plot(true[last:], vertical[last:], zorder=6, **STATIC_LINE)
@@ -194,7 +194,7 @@ def draw_static(ax: Any, static: Any) -> None:
 
 
 def draw_ends(ax: Any, chart: Any, ends: Any) -> int:
-    """The exact places at which a motion ends beside nothing but rest and no curve was followed, as dots; returns how many."""
+    """Dots where a motion ends next to a cell with rest alone and no curve was followed; returns their number."""
     known, target = np.isfinite(ends["horizontal"].values), ends["key"].values[:, 3:]
     shown = known & _resting(chart)[target[:, 0], target[:, 1]]
     ax.plot(ends["horizontal"].values[shown], ends["vertical"].values[shown], **DOT, zorder=5)
@@ -214,12 +214,12 @@ def _filling(name: str) -> Patch:
 
 
 def _fillings(charts: Sequence[Any]) -> list[Patch]:
-    """What the fillings of cells mean, those that are in any of the charts."""
+    """Legend entries of the fillings of cells that occur in any of the charts."""
     return [_filling(name) for name in FILLINGS if any(with_outcome(chart, name).any() for chart in charts)]
 
 
 def _cell_handles(chart: Any) -> list[Any]:
-    """What the marks in the cells of a chart mean, those that are there."""
+    """Legend entries of the marks that occur in the cells of a chart."""
     handles: list[tuple[Any, Any]] = [
         (_resting(chart), Patch(facecolor="white", edgecolor=INK, linewidth=0.4, label="rest alone")),
         *((with_outcome(chart, name), _filling(name)) for name in FILLINGS),
@@ -233,7 +233,7 @@ def _cell_handles(chart: Any) -> list[Any]:
 
 
 def _line_handles(curves: Iterable[Any], static: bool, rest: bool) -> list[Any]:
-    """What the lines of borders mean, those that are there."""
+    """Legend entries of the lines of borders that are drawn."""
     kinds = {str(curve.attrs["kind"]) for curve in curves}
     handles = [
         Line2D([], [], **STATIC_LINE, label="quasi-static border"),
@@ -245,7 +245,7 @@ def _line_handles(curves: Iterable[Any], static: bool, rest: bool) -> list[Any]:
 
 
 def chart_legend(figure: Any, charts: Sequence[Any], curves: Sequence[Any], closed_form: bool = False) -> None:
-    """What the lines and fillings mean, below all panels."""
+    """A legend of the lines and fillings, below all panels."""
     handles = _line_handles(curves, static=True, rest=True)
     handles.append(Line2D([], [], **LINE_LIMIT, label=r"max$|\theta|=\pi-\beta_0$"))
     handles += _fillings(charts)

@@ -1,4 +1,4 @@
-"""The look of every picture: the paper's conventions, colours that survive greyscale and colour-blindness, journal widths.
+"""The look of all pictures: the paper's conventions, colours that are also distinct in grey and for the colour-blind, widths.
 
 Stable is a solid blue line, unstable a dashed red one, a separatrix dashed grey, a limit of the mechanism dash-dotted green; no
 two of them share both a line style and a lightness. Along a branch such a line is heavy where the model holds, thin where an
@@ -86,7 +86,7 @@ def style() -> Iterator[None]:
 
 
 def styled(draw: Callable[P, R]) -> Callable[P, R]:
-    """Let a function draw a figure of its own in the conventions; axes or a figure that are given keep their style."""
+    """Let a function draw in the conventions if it makes a new figure; a given figure or given axes keep their style."""
 
     @wraps(draw)
     def inside(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -104,7 +104,7 @@ def new_figure(width: float = SINGLE_COLUMN, height: float = 65.0, **options: An
 
 
 def axes_or_new(ax: Axes | None, width: float, height: float) -> Axes:
-    """The axes that are given, or those of a figure of its own, of this size in mm."""
+    """The given axes, or those of a new figure of this size in mm."""
     if ax is not None:
         return ax
     new = new_figure(width, height).subplots()
@@ -113,7 +113,7 @@ def axes_or_new(ax: Axes | None, width: float, height: float) -> Axes:
 
 
 def shades(n: int, first: float = 0.0, last: float = 0.78) -> list[Any]:
-    """`n` colours of an ordered family, from dark to light: their order is also that of their greys."""
+    """`n` colours of an ordered family, from dark to light, which have the same order in grey."""
     return list(mpl.colormaps["viridis"](np.linspace(first, last, n))) if n > 1 else [mpl.colormaps["viridis"](first)]
 
 
@@ -124,14 +124,14 @@ def figure_of(axes: Any) -> Figure:
 
 
 def outside_legend(figure: Any, **options: Any) -> None:
-    """A legend below all panels of a figure, which is laid out so that it covers nothing."""
+    """A legend below all panels of a figure; the figure is laid out so that the legend covers nothing."""
     if figure.get_layout_engine() is None:
         figure.set_layout_engine("constrained")
     figure.legend(loc="outside lower center", **options)
 
 
 def legend_of(ax: Any, own: bool, handles: Iterable[Any], **options: Any) -> None:
-    """A legend below a figure of one's own (`own`), or within axes that were given."""
+    """A legend below a new figure (`own`), or within given axes."""
     if own:
         outside_legend(ax.figure, handles=list(handles), **options)
     else:
@@ -139,7 +139,7 @@ def legend_of(ax: Any, own: bool, handles: Iterable[Any], **options: Any) -> Non
 
 
 def marks_of(ax: Axes) -> dict[str, Any]:
-    """What a legend of axes would hold: what was drawn several times with one label stands once."""
+    """The handles and labels of a legend of axes, each label once."""
     handles, labels = ax.get_legend_handles_labels()
     return dict(zip(labels, handles, strict=True))
 

@@ -20,7 +20,7 @@ POINTS: dict[str, Any] = {"color": INK, "linestyle": "none", "marker": ".", "mar
 
 @dataclass(frozen=True)
 class StateSettings:
-    """Which stroboscopic states are drawn, and how large: as large as the step between values lets them be."""
+    """Which stroboscopic states are drawn, and how large: their size follows from the step between values."""
 
     finest: float = 1.3  # The least size of a point.
     coarsest: float = 3.5  # The largest size of a point.
@@ -30,16 +30,17 @@ class StateSettings:
 DRAWN_STATES = StateSettings()
 
 
-QUANTITIES = ("amplitude", "highest", "lowest", "slowest")  # what branches, special points and simulated motions all have
+QUANTITIES = ("amplitude", "highest", "lowest", "slowest")  # those of branches, special points and simulated motions
 
 
 @drawing
 def draw_diagram(tree: Any, quantity: str | None = None, *, ax: Axes | None = None, figure: Figure | None = None) -> Any:
     """Draw the DataTree of `response_spectrum` or `bifurcation_diagram`; returns its axes, (1 or 2,).
 
-    In a figure the states at phase 0 stand below the branches; into axes that are given the branches alone are drawn. The
-    `quantity` is the amplitude, the highest or the lowest value of a coordinate, or, with several contacts, the least speed of
-    an impact ("slowest", 0 without impacts); by default that where most motions have the same amplitude, as between two walls.
+    In a figure the states at phase 0 are below the branches; into given axes only the branches are drawn. The `quantity` is the
+    amplitude, the highest or the lowest value of a coordinate, or, with several contacts, the least speed of an impact
+    ("slowest", 0 without impacts). The default is the amplitude, or "slowest" if most motions have the same amplitude, as between
+    two walls.
     """
     known = [name for name in QUANTITIES if name in tree["attractors"]]
     if quantity is not None and quantity not in known:
@@ -72,7 +73,7 @@ def draw_diagram(tree: Any, quantity: str | None = None, *, ax: Axes | None = No
 
 
 def _with_finite_speeds(tree: Any) -> Any:
-    """The diagram with 0 for the least impact of an orbit without impacts, as simulated motions have it."""
+    """The diagram with 0 for the least impact speed of orbits without impacts, as simulated motions have it."""
     tree = tree.copy()
     for table, name in (("points", "slowest"), ("special", "special_slowest")):
         if name in tree[table]:
@@ -88,7 +89,7 @@ def _unit(tree: Any) -> str:
 
 
 def _range(tree: Any, quantity: str, low: float, high: float) -> tuple[float, float]:
-    """The least and the largest value of a quantity within the bounds, amplitudes and speeds from 0; to 1 where there is none."""
+    """The least and the largest value of a quantity within the bounds; amplitudes and speeds begin at 0. If equal, 1 apart."""
     points, found = tree["points"], tree["attractors"][quantity].values
     if points.sizes["point"]:
         x = points["parameter"].values
@@ -101,7 +102,7 @@ def _range(tree: Any, quantity: str, low: float, high: float) -> tuple[float, fl
 
 
 def draw_stroboscopic_states(ax: Any, tree: Any) -> None:
-    """Direct simulation: where motions are at phase 0 of the load, period after period, from every start."""
+    """The states at phase 0 of the load of the simulated motions from every start, period after period."""
     section = tree["stroboscopic"]
     draw_bands(ax, tree)
     moving = section["peak"].values > DRAWN_STATES.at_rest

@@ -1,4 +1,4 @@
-"""How a function that draws a dataset answers what it cannot draw: by the argument's name, in one sentence."""
+"""How a function that draws a dataset refuses what it cannot draw: in one sentence with the argument's name."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ NARROWEST, WIDEST = 10.0, 2000.0  # mm, of a picture: from a stamp to the widest
 
 
 def drawing(draw: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[Any, P], R]:
-    """A decorator of what draws a dataset, in the conventions: arguments of a wrong kind are refused by their names.
+    """A decorator of functions that draw a dataset in the conventions: arguments of a wrong kind are refused by their names.
 
-    Datasets are open to their users: of one that lacks something, or whose arrays do not fit one another, what NumPy and
-    Matplotlib say becomes a sentence.
+    Users can change datasets: if one lacks something, or its arrays do not fit one another, the error of NumPy or Matplotlib is
+    turned into a sentence.
     """
     name, drawn = next(iter(signature(draw).parameters)), styled(draw)
 

@@ -12,7 +12,7 @@ from saltus.plots.conventions import SINGLE_COLUMN, STABLE, axes_or_new
 from saltus.plots.drawing import drawing
 from saltus.plots.marks import cell_edges
 
-OWN = ("period", "state", "column")  # dimensions of what is kept of each motion
+OWN = ("period", "state", "column")  # dimensions within one motion, and not of the ensemble
 
 
 @drawing

@@ -21,9 +21,9 @@ HALVES = (("at_half", "<", "first half of the run"), ("later_half", ">", "second
 
 @drawing
 def draw_exponents(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
-    """Draw the exponents of one motion, with 95 % intervals, those of both halves of the run, and of the other method.
+    """Draw the exponents of one motion with 95 % intervals, those of both halves of the run, and that of two trajectories.
 
-    Grey is what cannot be told from 0, twice the logarithm of the time over the time.
+    The grey range, 2 ln(t) / t for the time t, cannot be distinguished from 0.
     """
     own, ax = ax is None, axes_or_new(ax, width, 0.75 * width)
     values, errors = dataset["exponent"].values, dataset["error"].values

@@ -1,4 +1,4 @@
-"""Misalignment and difference angle as an impact comes near."""
+"""Misalignment and difference angle as an impact is approached."""
 
 from __future__ import annotations
 

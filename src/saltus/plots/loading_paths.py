@@ -13,7 +13,7 @@ TINT = "#dfeaf4"
 
 
 def draw_domain(ax: Any, borders: Any, label: bool = True) -> None:
-    """The true domain shaded, the part that only the printed border gives it hatched, and both borders."""
+    """The true domain shaded, the part that belongs to it by the printed border only hatched, and both borders."""
     vertical, critical = borders["vertical"].values, borders["critical"].values
     folded, fold = borders["folded"].values, borders["fold"].values
     start = float(borders.attrs["subcritical_below"])

@@ -28,8 +28,8 @@ def draw_motion(dataset: xarray.Dataset, *, ax: Axes | None = None, figure: Figu
     """The coordinates over time, and velocities over coordinates, of a motion as `Motion.to_xarray` gives it; returns both axes.
 
     The phase portrait shows all of the motion in grey and its last forcing period on top; without a forcing period, all of it.
-    An open circle marks the start, a full one the end. Green lines mark the limits of the mechanism that are reached. Into axes
-    that are given the coordinates over time alone are drawn.
+    An open circle marks the start, a full one the end. Green lines mark the limits of the mechanism that are reached. Into given
+    axes only the coordinates over time are drawn.
     """
     if ax is None:
         figure = new_figure(DOUBLE_COLUMN, 68.0) if figure is None else figure
@@ -55,7 +55,7 @@ def draw_motion(dataset: xarray.Dataset, *, ax: Axes | None = None, figure: Figu
 
 
 def coordinates(dataset: xarray.Dataset) -> list[str]:
-    """The names of the coordinates in a motion's dataset: its whole numbers are the side, and what is closed or slides."""
+    """The names of the coordinates in a motion's dataset; variables of whole numbers are sides and states of contacts."""
     names = [str(name) for name, values in dataset.data_vars.items() if values.dtype.kind == "f"]
     return [name for name in names if rate_of(dataset, name) in dataset]
 
@@ -67,7 +67,7 @@ def rate_of(dataset: xarray.Dataset, name: str) -> str:
 
 
 def arcs(dataset: xarray.Dataset, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Time, position and velocity with the impacts put in between the samples, parted by NaN where the velocity jumps."""
+    """Time, position and velocity with the impacts inserted between the samples, separated by NaN where the velocity jumps."""
     time, position, velocity = (dataset[n].values for n in ("time", name, rate_of(dataset, name)))
     rate = rate_of(dataset, name)
     if f"impact_{rate}_before" not in dataset:
@@ -87,7 +87,7 @@ def arcs(dataset: xarray.Dataset, name: str) -> tuple[np.ndarray, np.ndarray, np
 
 
 def _contact(at: np.ndarray, before: np.ndarray, samples: tuple[np.ndarray, np.ndarray, np.ndarray]) -> float:
-    """Where all impacts happen, from the last samples before them and the velocities there."""
+    """The coordinate of the contact, extrapolated from the last samples before the impacts and the velocities there."""
     time, position, velocity = samples
     last = np.clip(np.searchsorted(time, at, side="left") - 1, 0, None)
     guesses = position[last] + (velocity[last] + before) / 2 * (at - time[last])

@@ -32,7 +32,7 @@ FACES = {True: ("stable orbit", STABLE, STABLE, "o"), False: ("unstable orbit", 
 def draw_search(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * SINGLE_COLUMN) -> Axes:
     """Draw the amplitudes of the orbits of `search_orbits`, stable ones filled, unstable ones open; returns `ax`.
 
-    Beside a mark is the number of forcing periods, where it is not 1; crosses are what simulation has settled on.
+    Beside a mark is the period, if it is not 1; crosses are the orbits on which simulated motions have settled.
     """
     ax = axes_or_new(ax, width, 0.62 * width)
     x, y = dataset["parameter"].values, dataset["amplitude"].values
@@ -57,9 +57,9 @@ def draw_search(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * SI
 
 @drawing
 def draw_cascade(dataset: Any, *, ax: Axes | None = None, figure: Figure | None = None) -> Any:
-    """Draw a cascade of period doublings: the parameters at which they are, their ratios and the limit; returns both axes.
+    """Draw a cascade of period doublings: their parameters, the ratios of successive distances and the limit; returns both axes.
 
-    Into axes that are given the parameters alone are drawn.
+    Into given axes only the parameters are drawn.
     """
     if ax is not None:
         return _draw_doublings(ax, dataset)

@@ -1,4 +1,4 @@
-"""Lines of a phase plane: where motions are cut so that their lines stay apart, and where arrows stand along them."""
+"""Lines of a phase plane: where motions are cut so that their lines stay apart, and where arrows are drawn along them."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from saltus.plots.marks import arrow_along
 class LineSpacing:
     """How near lines and arrows of a phase plane may come to one another; lengths are in widths of the window."""
 
-    cells: int = 48  # along each side of the window: a motion ends where it enters a cell through which another one is drawn
-    lap_cells: int = 160  # the same for a motion and its own earlier laps
-    apart: float = 8 / 160  # travelled between two laps: less is the same passage of a cell
-    closing: float = 2 / 160  # length drawn beyond the first lap, so that a motion that repeats itself is closed
-    least: float = 0.08  # what is left of a motion is not drawn if it is shorter
+    cells: int = 48  # cells along each side of the window: a motion is cut where it enters a cell with the line of another one
+    lap_cells: int = 160  # the cells for a motion and its own earlier laps
+    apart: float = 8 / 160  # least length between two laps: a motion that returns to a cell sooner has not left it
+    closing: float = 2 / 160  # length drawn beyond the first lap, so that the line of a periodic motion is closed
+    least: float = 0.08  # a motion is not drawn if less than this length is left of it
     first_arrow: float = 0.12  # length from the start of a motion to its first arrow
 
 
@@ -27,7 +27,7 @@ SPACING = LineSpacing()
 
 
 def travelled(points: np.ndarray) -> np.ndarray:
-    """The length of the way (n, 2) to each of its points; jumps have none."""
+    """The length of a line (n, 2) up to each of its points; jumps do not count."""
     steps = np.hypot(*np.diff(points, axis=0).T)
     return np.append(0.0, np.cumsum(np.nan_to_num(steps)))
 
@@ -42,7 +42,7 @@ def draw_arrows(ax: Any, x: np.ndarray, v: np.ndarray, spacing: float, last: int
 
 
 def lines_apart(motions: list[tuple[np.ndarray, np.ndarray]], window: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Motions (x, v) up to where they come near to one before them or to themselves, without those of which little is left."""
+    """Motions (x, v), cut where they come near to an earlier one or to themselves, without those of which little is left."""
     taken = np.zeros((SPACING.cells, SPACING.cells), dtype=bool)
     lines = []
     for x, v in motions:
@@ -57,7 +57,7 @@ def lines_apart(motions: list[tuple[np.ndarray, np.ndarray]], window: np.ndarray
 
 
 def _first_near(scaled: np.ndarray, inside: np.ndarray, taken: np.ndarray) -> int:
-    """The sample at which a motion comes to where another one is drawn."""
+    """The sample at which a motion enters a cell in which another one is drawn."""
     cells = np.where(inside[:, None], scaled * SPACING.cells, 0.0).astype(int)
     near = np.flatnonzero(taken[cells[:, 0], cells[:, 1]] & inside)
     return int(near[0]) if near.size else len(scaled)

@@ -15,10 +15,10 @@ from saltus.plots.phase_lines import draw_arrows
 
 @dataclass(frozen=True)
 class PortraitSettings:
-    """What of a trajectory is drawn."""
+    """Which part of a trajectory is drawn."""
 
-    core: float = 0.032  # Motions this close in energy to theta = 0 are left out: their impacts would fill it with ink.
-    eye: float = 0.0012  # The same distance at a deformed equilibrium, around which motions spiral.
+    core: float = 0.032  # Motions this close in energy to theta = 0 are left out: their many lines would merge to a black area.
+    eye: float = 0.0012  # This distance at a deformed equilibrium, around which motions spiral.
     away: float = 0.03  # The distance, in window widths, at which a trajectory has left its start.
     back: float = 0.004  # The distance, in window widths, at which it has come back to its start.
 

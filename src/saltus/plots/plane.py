@@ -21,8 +21,8 @@ ARROWS = 0.6  # window widths between arrows along a motion
 def draw_plane(dataset: Any, *, ax: Axes | None = None, width: float = 1.5 * SINGLE_COLUMN) -> Axes:
     """Draw a dataset of `saltus.phase_portrait`; returns the axes.
 
-    Stable equilibria are filled, unstable ones open. Motions from given starts are drawn to their ends; those that were spread
-    over the window end where they come near to one that is drawn, so that lines stay apart.
+    Stable equilibria are filled, unstable ones open. Motions from given starts are drawn to their ends; motions from starts that
+    were spread over the window are cut where they come near to one that is drawn, so that lines stay apart.
     """
     name = dataset.attrs["coordinate"]
     window = np.asarray(dataset.attrs["window"], dtype=float).reshape(2, 2)
@@ -41,7 +41,7 @@ def draw_plane(dataset: Any, *, ax: Axes | None = None, width: float = 1.5 * SIN
     stable = dataset["stable"].values.astype(bool)
     fixed_points(ax, dataset["equilibrium"].values, stable)
     for artist in (*ax.texts, *ax.lines):
-        artist.set_in_layout(False)  # what is outside the window would take room beside it
+        artist.set_in_layout(False)  # else parts outside the window would be given room beside it
     ax.set_xlabel(rf"${symbol(name)}${unit_in_brackets(dataset[name])}")
     ax.set_ylabel(rf"$\dot{{{symbol(name)}}}${unit_in_brackets(dataset[name])}")
     _legend(ax, own, stable, bool(dataset.sizes["separatrix"]))
@@ -49,7 +49,7 @@ def draw_plane(dataset: Any, *, ax: Axes | None = None, width: float = 1.5 * SIN
 
 
 def _legend(ax: Axes, own: bool, stable: np.ndarray, separatrices: bool) -> None:
-    """What is there of stable and unstable equilibria and separatrices."""
+    """A legend of the stable and unstable equilibria and the separatrices, as far as there are any."""
     dot: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 4.5}
     handles = [Line2D([], [], color=STABLE, lw=0.7, label="motion")]
     if stable.any():

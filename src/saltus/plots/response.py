@@ -36,16 +36,16 @@ class ResponseSettings:
     inset_places: int = 24  # The number of places along each side of the axes that are tried for an inset.
     inset_margin: float = 0.05  # The ticks of an inset take this share of the axes.
     inset_weight: float = 0.65  # Lines in an inset are drawn with this share of their width, as they lie closer together.
-    dotted_values: int = 25  # Simulated motions are drawn at about so many values: more dots hide the lines that they confirm.
-    letters: float = 880.0  # In a column twice as wide so many letters of one point stand beside one another.
-    mark_distance: float = 1.5  # Marks of one kind that are nearer, in mm, are left to the insets and to the data.
+    dotted_values: int = 25  # Simulated motions are drawn at about this many values: more dots would hide the lines.
+    letters: float = 880.0  # The number of letters of size one point that fit beside one another into a double column.
+    mark_distance: float = 1.5  # Of marks of one kind nearer to one another than this, in mm, only some are drawn.
 
 
 SETTINGS = ResponseSettings()
 
 QSB_LINE: dict[str, Any] = {"color": "#7b2d9b", "linestyle": (0, (3, 2)), "linewidth": 1.0}
 FARTHEST_LINE: dict[str, Any] = {"color": LIMIT, "linestyle": (0, (1, 1.2)), "linewidth": 1.2}
-# Heavy where the model holds, thin where an assumption fails, thin and pale beyond a limit: told apart in grey as well.
+# Heavy where the model holds, thin where an assumption fails, thin and pale beyond a limit: distinct in grey as well.
 WEIGHTS = {ModelValidity.HOLDS: 1.7, ModelValidity.ASSUMPTION: 0.75, ModelValidity.LIMIT: 0.75}
 PALE = {True: PALE_STABLE, False: PALE_UNSTABLE}
 BANDS = {"QP": "#cfe6f7", "CH": "#fbd9b0"}  # quasi-periodic light blue, chaotic light orange
@@ -83,7 +83,7 @@ def highest(spectrum: Any, low: float, high: float, quantity: str = "amplitude")
 
 
 def lowest(spectrum: Any, low: float, high: float, quantity: str = "amplitude") -> float:
-    """The least one."""
+    """The least value of a quantity on all branches between two values of the parameter."""
     return float(_inside(spectrum, low, high, quantity).min())
 
 
@@ -104,7 +104,7 @@ def draw_branches(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: fl
 
 
 def line_style(stable: bool, validity: ModelValidity, weight: float = 1.0) -> dict[str, Any]:
-    """How motions of a stability and a validity are drawn, in `weight` times the usual width."""
+    """The line style of motions of this stability and validity, in `weight` times the usual width."""
     style = {**(STABLE_LINE if stable else UNSTABLE_LINE), "linewidth": weight * WEIGHTS[validity]}
     return style | ({"color": PALE[stable]} if validity is ModelValidity.LIMIT else {})
 
@@ -139,7 +139,7 @@ def _mark(style: dict[str, Any]) -> dict[str, Any]:
 
 
 def draw_attractors(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: float = 1.0) -> None:
-    """The attractors found by direct simulation, as dots over the branches: at some values, and all that lie on no branch."""
+    """The attractors found by simulation, as dots over the branches: at some values only, but all that lie on no branch."""
     dots = spectrum["attractors"]
     values = np.unique(dots["parameter"].values)
     shown = np.isin(dots["parameter"].values, values[:: max(1, round(len(values) / SETTINGS.dotted_values))])
@@ -150,7 +150,7 @@ def draw_attractors(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: 
 
 
 def note_missed(ax: Any, spectrum: Any) -> None:
-    """At the right above the axes: which share of a random sample of states ends on what the diagram lacks, with its interval."""
+    """Write above the axes which share of random states ends on something that the diagram lacks, with its interval."""
     share, low, high = (100 * float(spectrum.attrs.get(f"missed_{name}", np.nan)) for name in ("share", "low", "high"))
     ended = 100 * float(spectrum.attrs.get("ended_share", 0.0))
     if np.isfinite(share):
@@ -195,7 +195,7 @@ def draw_zoom(
     quantity: str = "amplitude",
     scale: float = 1.0,
 ) -> Any:
-    """An inset of a `size` (shares of the axes) where there is room, with the part `window` (x from, to, y from, to)."""
+    """An inset of a `size` (shares of the axes), placed where there is room, with the part `window` (x from, to, y from, to)."""
     inset = ax.inset_axes(free_place(ax, spectrum, size, quantity, scale))
     inset.set_xlim(window[:2])
     inset.set_ylim(window[2:])
@@ -247,14 +247,15 @@ def free_place(
             inside = (np.abs(points - np.array([x + size[0] / 2, y + size[1] / 2])) < np.array(size) / 2 + margin).all(axis=1)
             crossed = sum(y - margin < line < y + size[1] + margin for line in lines)
             hidden = int(((bands[:, 0] < x + size[0]) & (bands[:, 1] > x)).sum())
-            cost = inside.sum() + 0.5 * (crossed + hidden) - 1e-3 * y  # rather a line or band than a branch, and rather above
+            # It is better to cover a line or a band than a branch, and better to be high than low.
+            cost = inside.sum() + 0.5 * (crossed + hidden) - 1e-3 * y
             if cost < least:
                 best, least = (x, y), cost
     return (*best, *size)
 
 
 def response_legend(where: Any, spectra: list[Any], *, limits: bool = True, critical: bool = False, columns: int = 4) -> None:
-    """One legend of what is in all panels: below those of a figure, or within axes."""
+    """One legend for all panels: below those of a figure, or within axes."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -290,14 +291,14 @@ def response_legend(where: Any, spectra: list[Any], *, limits: bool = True, crit
 
 
 def missed_states(spectra: list[Any]) -> str | None:
-    """What the share means that `note_missed` writes above the panels; None where no sample was taken."""
+    """The explanation of the share that `note_missed` writes above the panels; None if no sample was taken."""
     if not any("missed_low" in spectrum.attrs for spectrum in spectra):
         return None
     return "missed: random states that end on a motion that is not drawn, and the 95 % interval of their share"
 
 
 def line_handles(branches: list[Any]) -> tuple[list[Any], list[str], dict[Any, Any]]:
-    """Handles and labels of the lines of branches, and what draws the handles, as a legend takes them."""
+    """Handles and labels of the lines of branches, and the handlers that draw them, as a legend takes them."""
     from matplotlib.legend_handler import HandlerTuple
     from matplotlib.lines import Line2D
 
@@ -311,7 +312,7 @@ def line_handles(branches: list[Any]) -> tuple[list[Any], list[str], dict[Any, A
 
 
 def line_labels(branches: list[Any]) -> list[tuple[str, list[dict[str, Any]]]]:
-    """What the lines of branches mean, with the styles of stable and unstable ones; by validity where any margin bears on it."""
+    """The labels of the lines of branches, with the styles of stable and unstable motions; by validity if there are margins."""
     names = {kind: sorted({name for branch in branches for name in margins_of(branch, kind)}) for kind in ModelValidity}
     if not any(names.values()):
         return [(name, [line_style(name == "stable", ModelValidity.HOLDS)]) for name in ("stable", "unstable")]

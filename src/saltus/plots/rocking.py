@@ -12,7 +12,7 @@ SHORT_DASHES, SLENDER_DASHES = (0, (1, 1.3)), (0, (5, 2))
 
 
 def draw_periods(ax: Any, data: Any) -> None:
-    """p T0 over theta0 / alpha: closed form, simulated dots, and the arccosh that is one curve for every alpha."""
+    """p T0 over theta0 / alpha: closed form, simulated dots, and the arccosh, which is the same curve for every alpha."""
     for i, colour in enumerate(shades(data.sizes["alpha"])):
         name = rf"$\alpha={np.rad2deg(float(data['alpha'][i])):.0f}^\circ$"
         ax.plot(data["share"], data["exact"][i], color=colour, lw=1.2, label=name)

@@ -1,4 +1,4 @@
-"""The derivatives of a motion's end to where it starts and to parameters."""
+"""The derivatives of a motion's end by its start and by parameters."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from saltus.plots.conventions import INK, axes_or_new
 from saltus.plots.drawing import drawing
 
 ENTRY_WIDTH = 18.0  # mm, of one derivative
-DARKEST = 6.0  # times the largest derivative would be black: numbers are read on what is lighter
+DARKEST = 6.0  # black would stand for this many times the largest derivative, so that numbers on the shades can be read
 
 
 @drawing

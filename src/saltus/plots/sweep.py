@@ -37,7 +37,7 @@ def draw_sweep(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * SIN
     for way, line in WAYS.items():
         found = _jumps(dataset, way)
         middle = found[:, :2].mean(axis=1)
-        x = np.concatenate([values, found[:, 0], middle, found[:, 1]])  # interrupted at a jump, which is no line of motions
+        x = np.concatenate([values, found[:, 0], middle, found[:, 1]])  # interrupted at a jump, as no motions lie in between
         y = np.concatenate(
             [dataset["amplitude"].sel(direction=way).values, found[:, 2], np.full(len(found), np.nan), found[:, 3]]
         )

@@ -1,4 +1,4 @@
-"""The unit cell as an engineer would draw it: bars, hinges, sliders, springs, masses, angles, forces and ground motion."""
+"""The unit cell as a mechanical drawing: bars, hinges, sliders, springs, masses, angles, forces and ground motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A verdict: where the motion is at its end, and the sentence that says why."""
+"""A verdict: the states on which the motion ends, and the sentence that gives the reason."""
 
 from __future__ import annotations
 

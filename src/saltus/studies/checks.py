@@ -1,4 +1,4 @@
-"""What studies along a parameter refuse before anything is computed."""
+"""The checks of a study's arguments along a parameter, made before anything is computed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from saltus.systems import System, check_system
 
 
 def check_diagram(system: System, path: str, bounds: tuple[float, float], **counts: int) -> tuple[float, float]:
-    """The bounds as two numbers; raises a ParameterError, before anything is computed, for what would fail later."""
+    """The bounds as two numbers; raises a ParameterError for arguments with which the study would fail later."""
     check_system(system, "a diagram", several_contacts=True)
     if system.load.frequency is None:
         raise ParameterError(

@@ -30,8 +30,8 @@ class StartSettings:
     """Where motions begin unless their states are given."""
 
     spread: int = 24  # Number of states, spread evenly over the window.
-    tried: int = 100  # Factor by which more places are tried than states are wanted, as a wall may take a part of the window.
-    beside: tuple[float, ...] = (0.35, 0.75)  # From beside each stable equilibrium, at these shares of the way to the next one.
+    tried: int = 100  # Places tried for each state that is wanted, as a wall may take up a part of the window.
+    beside: tuple[float, ...] = (0.35, 0.75)  # Beside each stable equilibrium, at these shares of the way to the next one.
 
 
 PORTRAIT_STARTS = StartSettings()
@@ -41,7 +41,7 @@ def _check(system: System, window: Box, starts: Any, duration: float, samples: i
     check_number("duration", duration, above=0.0)
     check_count("samples", samples, 2)
     check_count("seed", seed, 0)
-    points = equilibria(system, window)  # which refuses what has no phase plane
+    points = equilibria(system, window)  # refuses a system without a phase plane
     _ = _spread(system, window, points, seed) if starts is None else _states(system, starts)
 
 
@@ -63,27 +63,27 @@ def phase_portrait(
     system
         What moves.
     window
-        The least and the largest coordinate, then velocity.
+        ((least, largest coordinate), (least, largest velocity)).
     starts
         States (coordinate, velocity) from which motions are followed; by default two beside each stable equilibrium, and
         24 spread over the window.
     duration
         How long, in dimensionless time.
     samples
-        Instants at which each motion is given, besides its impacts.
+        Number of instants at which each motion is given, besides its impacts.
     seed
-        Of the spread.
+        The seed of the spread states.
     progress
         Called with the fraction done and what is being done, first when all arguments have been checked.
 
     Returns
     -------
     xarray.Dataset
-        A Dataset: `time`, the coordinate and `velocity` over (motion, sample), with the velocities before and after each impact,
-        and nan between them where they differ; `equilibrium`, the coordinates of all equilibria in the window, with `stable`
-        and, over (equilibrium, root), the real and imaginary part of the `eigenvalue`s, nan at the contact;
-        `separatrix_<coordinate>` and `separatrix_velocity` over (separatrix, point): the stable manifolds of the saddles, none
-        where the impact law has no inverse (the attribute `no_separatrices` says why).
+        A Dataset. Over (motion, sample): `time`, the coordinate and `velocity`, with the velocities before and after each impact,
+        and nan between them where they differ. Over `equilibrium`, the coordinates of all equilibria in the window: `stable`.
+        Over (equilibrium, root): the parts `eigenvalue_real` and `eigenvalue_imaginary`, nan at the contact. Over (separatrix,
+        point): `separatrix_<coordinate>` and `separatrix_velocity` of the stable manifolds of the saddles; there are none where
+        the impact law has no inverse, and the attribute `no_separatrices` then says why.
 
     Raises
     ------
@@ -135,14 +135,14 @@ def _beside(place: float, ends: list[float], share: float) -> float:
 
 
 def _possible(system: System, places: np.ndarray) -> np.ndarray:
-    """Which coordinates are within the mode of some side."""
+    """Which coordinates lie inside a side, where the gap is positive."""
     model = system.model
     sides = [np.asarray(model.gap(places, side)) > 0.0 for side in model.sides]
     return np.any(sides, axis=0) if sides else np.ones(len(places), dtype=bool)
 
 
 def _states(system: System, starts: Any) -> np.ndarray:
-    """Given states (n, 2)."""
+    """The given states (n, 2), checked."""
     states = check_states("starts", starts)
     if not len(states):
         raise ParameterError("starts must be states (coordinate, velocity), such as [[0.3, 0.0]], and there is none", "starts")
@@ -153,7 +153,7 @@ def _states(system: System, starts: Any) -> np.ndarray:
 
 
 def _no_inverse(system: System) -> str:
-    """Why motions cannot be followed back through impacts, or nothing."""
+    """Why motions cannot be followed backward through impacts; an empty text if they can."""
     if not system.model.sides or (isinstance(system.impact, VelocityReduction) and system.impact.e > 0.0):
         return ""
     return f"{type(system.impact).__name__} cannot be followed backward"
@@ -205,7 +205,7 @@ def _dataset(
 
 
 def _padded(rows: list[np.ndarray]) -> np.ndarray:
-    """Arrays (k, n) of various lengths as one (rows, k, longest), nan behind each."""
+    """Arrays (k, n) of different lengths n as one, (rows, k, longest), filled up with nan."""
     out = np.full((len(rows), rows[0].shape[0], max(row.shape[1] for row in rows)), np.nan)
     for i, row in enumerate(rows):
         out[i, :, : row.shape[1]] = row

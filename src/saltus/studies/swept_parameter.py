@@ -1,4 +1,4 @@
-"""What an experimenter does: a parameter of the load is swept up and down, and the motion is carried along."""
+"""Sweeps as in an experiment: a parameter is changed step by step, up and down again, while the motion goes on."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ DIRECTIONS = ("up", "down")
 
 @dataclass(frozen=True)
 class SweepSettings:
-    """The numbers by which a step of the amplitude is a jump."""
+    """The numbers by which it is decided whether a step of the amplitude is a jump."""
 
     step_factor: float = (
-        5.0  # A step is examined if it is so many times the median of those around it: a smooth response has few.
+        5.0  # A step is examined if it is this many times the median of the steps around it: a smooth response has few such.
     )
-    neighbours: int = 10  # Number of steps around it whose median that is.
-    least_step: float = 0.002  # Smaller steps, as a share of the largest amplitude, are below what a plot shows.
-    # A large step is swept again in so many parts, and where it is found then in parts of these: as transients shrink with the
-    # parts, what is left is the jump of a slow sweep.
+    neighbours: int = 10  # Number of steps around it of which the median is taken.
+    least_step: float = 0.002  # Steps below this share of the largest amplitude are invisible in a plot, and are not examined.
+    # A large step is swept again in 32 parts, and the part that contains the change again in parts of 1/1024 of the step:
+    # transients become shorter with the parts, so that the jump of a slow sweep is left.
     parts: tuple[int, ...] = (32, 1024)
     kept: float = (
-        0.1  # The share of the step that must be left then, so that it is a jump: of a root, as beside a fold, 0.03 is left.
+        0.1  # The share of the step that must be left in one part, if it is a jump; a root, as near a fold, leaves 0.03.
     )
-    hysteresis: float = 0.01  # Amplitudes up and down are two if they differ by this share of the largest one.
+    hysteresis: float = 0.01  # Amplitudes up and down are different if they differ by this share of the largest one.
 
 
 SETTINGS = SweepSettings()
@@ -111,7 +111,7 @@ def _check(progress: object = None, **arguments: Any) -> None:
 
 
 def _taken_out(arguments: dict[str, Any]) -> dict[str, Any]:
-    """The coordinates among named arguments, which are taken out of them."""
+    """The coordinates among named arguments; they are removed from these."""
     known = set(SweepRequest.__dataclass_fields__)
     return {name: arguments.pop(name) for name in list(arguments) if name not in known}
 
@@ -130,27 +130,27 @@ def frequency_sweep(
     progress: Progress = silent,
     **coordinates: float,
 ) -> xarray.Dataset:
-    """The response while a parameter goes up and down again, as in an experiment: each value begins with the state of the last
-    one.
+    """The response while a parameter goes up and down again, as in an experiment: at each value the motion starts from the last
+    state at the value before.
 
-    Stepwise (`stop_early`), each value is kept until the motion repeats itself. Slowly and steadily (`stop_early=False`), it is
-    kept for exactly `periods` forcing periods: with 1 and many values the parameter changes in each period. Values change at
-    phase 0 of the load, so that the phase of a harmonic does not jump.
+    With `stop_early`, each value is kept until the motion repeats itself. Without, it is kept for exactly `periods` forcing
+    periods: with periods=1 and many values the parameter changes slowly and steadily. Values change at phase 0 of the load, so
+    that the phase of a harmonic does not jump.
 
-    A step of the amplitude that is large beside its neighbours, or at which impacts or period change, is swept again in parts, to
-    a thousandth, and what is then left of it is a jump (without `stop_early` it is reported as it is). Where up and down differ
-    there is hysteresis.
+    A step of the amplitude that is large compared with its neighbours, or at which the number of impacts or the period changes,
+    is swept again in parts, down to a thousandth of it; the part that is then left is a jump (without `stop_early` the step
+    itself is reported). Where up and down differ there is hysteresis.
 
     Parameters
     ----------
     system
         What moves, under a load with a frequency.
     values
-        Of the parameter, increasing.
+        Values of the parameter, increasing.
     path
-        Its dotted path.
+        Dotted path of the parameter.
     periods
-        Forcing periods at each value, at most or exactly.
+        Forcing periods at each value: the most with `stop_early`, else exactly so many.
     stop_early
         Whether a value is left as soon as the motion repeats itself.
     max_period
@@ -165,10 +165,10 @@ def frequency_sweep(
     Returns
     -------
     xarray.Dataset
-        A Dataset over (direction, value): of the first coordinate in the motion's period `amplitude` (its largest size),
-        `largest_...` and `smallest_...`; `impact_count`, `period` (0: it does not repeat itself), `outcome` and the state at
-        phase 0; over (value): `hysteresis`; over (jump): its direction, the values that enclose it and the amplitudes there.
-        Values that a motion did not reach, as a margin ended it, are nan.
+        A Dataset. Over (direction, value): `amplitude` (largest absolute value), `largest_...` and `smallest_...` of the first
+        coordinate in the motion's period; `impact_count`, `period` (0: it does not repeat itself), `outcome` and the state at
+        phase 0. Over (value): `hysteresis`. Over (jump): its direction, the values that enclose it and the amplitudes there. At
+        values that were not reached, as a margin ended the motion before, there is nan.
 
     Raises
     ------
@@ -196,7 +196,7 @@ def frequency_sweep(
 
 @dataclass(frozen=True)
 class _OneWay:
-    """One direction: the values that were reached, in their order, and what became of the motion at each."""
+    """A sweep in one direction: the values that were reached, in their order, and the motion at each."""
 
     values: np.ndarray
     start: np.ndarray
@@ -204,12 +204,12 @@ class _OneWay:
 
     @property
     def amplitude(self) -> np.ndarray:
-        """At each value."""
+        """The amplitude at each value."""
         return np.array([amplitude_of(row) for row in self.rows])
 
 
 def amplitude_of(row: Recurrence) -> float:
-    """The largest size of the first coordinate in a motion's period."""
+    """The largest absolute value of the first coordinate in a motion's period."""
     return float(max(abs(row.highest[0]), abs(row.lowest[0])))
 
 
@@ -238,7 +238,7 @@ def _jumps(asked: SweepRequest, run: _OneWay) -> list[tuple[float, ...]]:
 
 
 def _located(asked: SweepRequest, run: _OneWay, i: int) -> tuple[float, float, float, float]:
-    """The part of a step in which a slower sweep has what the step has, and the amplitudes at its ends."""
+    """The part of step i in which a slower sweep makes the change of amplitude, with the amplitudes at the ends of this part."""
     first, last = (float(value) for value in run.values[i : i + 2])
     a, b = (amplitude_of(row) for row in run.rows[i : i + 2])
     found, low, state = (first, last, a, b), first, run.rows[i].last[0]
@@ -258,7 +258,7 @@ def _located(asked: SweepRequest, run: _OneWay, i: int) -> tuple[float, float, f
 
 
 def _candidates(run: _OneWay) -> list[int]:
-    """The steps of the amplitude that are large beside those around them, or at which impacts or the period change."""
+    """The steps of the amplitude that are large compared with those around them, or at which impacts or the period change."""
     sizes, reach = run.amplitude, SETTINGS.neighbours // 2
     steps, kinds = np.abs(np.diff(sizes)), [(row.impact_count[0], row.period[0]) for row in run.rows]
     other = np.array([one != following for one, following in pairwise(kinds)], dtype=bool)

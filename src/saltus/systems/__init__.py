@@ -1,4 +1,4 @@
-"""What moves: the contract of a model, the models, their loads and impact laws, and the system that joins them.
+"""Systems: the contract of a model, the models, their loads and impact laws, and the system that joins the three.
 
 Every class here is frozen, dimensionless and pure; `UnitCell` converts from and to SI. Nothing here integrates anything.
 """

@@ -1,4 +1,4 @@
-"""The belt oscillator: a mass on a spring that a moving belt rubs."""
+"""The belt oscillator: a mass on a spring, pressed on a moving belt."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from saltus.systems.model import Model
 @answering("__init__")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BeltOscillator(Model):
-    """x'' + c x' + k x = F(tau) + f, a mass pressed with N(tau) on a belt of speed w, with the friction f, `belt`:
+    """x'' + c x' + k x = F(tau) + f, a mass pressed with N(tau) on a belt of speed w; the friction f (named `belt`) is
 
         f = -mu_k N sign(x' - w) while it slides,    abs(f) <= mu_s N while it sticks, x' = w.
 
@@ -63,12 +63,12 @@ class BeltOscillator(Model):
 
     @property
     def sides(self) -> tuple[int, ...]:
-        """None: it has a friction."""
+        """No sides, as it has a friction."""
         return ()
 
     @property
     def frictions(self) -> tuple[Friction, ...]:
-        """That of the belt."""
+        """The friction of the belt."""
         given = {"kinetic": self.kinetic, "static": self.static, "ground_speed": self.belt_speed}
         return (Friction(name="belt", coordinate="x", **given),)
 
@@ -81,7 +81,7 @@ class BeltOscillator(Model):
         return load.force(t) - self.damping * velocity - self.stiffness * x
 
     def mirror(self, load: Load) -> Load | None:
-        """The force reversed, on ground that stands still; None otherwise."""
+        """The load with the force reversed, if the belt stands still; None otherwise."""
         return reversed_load(load, "force") if self.belt_speed == 0.0 else None
 
     def kinetic_energy(self, t: Any, x: Any, velocity: Any, side: Any, load: Load) -> Any:

@@ -1,4 +1,4 @@
-"""Chains of cells of the metainterface: each with both of its layers, and springs between the masses of neighbours."""
+"""Chains of cells of the metainterface: cells with two layers, and springs between the masses of neighbouring cells."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ def _names(cells: int) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CellChain(LayeredCell):
-    """Cells side by side, each a `TwoLayer` of the same numbers under the same loads; `TwoCells`, `ThreeCells` and `FourCells`.
+    """Cells side by side, each a `TwoLayer` with the same numbers and loads; its subclasses have two, three or four cells.
 
     Long horizontal springs join each mass to that of the same layer in the neighbouring cell: with the displacements
 
         u_1 = cos(beta0) - cos(beta0 + theta_1),    u_2 = u_1 + cos(beta0 - theta_2) - cos(beta0)
 
-    of the lower and the upper mass of a cell, per length of a layer, their energy per K2 is kappa / 2 times the sum of the
-    squares of u_j less that of the neighbour. Coordinates are theta_1 >= 0 (`lower_1`, `lower_2`, ...) and theta_2 <= 0
-    (`upper_1`, ...); each has a contact of the same name. An impact passes its speed on within its cell only.
+    of the lower and the upper mass of a cell, in units of l, the energy of the springs per K2 is kappa / 2 times the sum of the
+    squares of the differences of u_j between neighbouring cells. Coordinates are theta_1 >= 0 (`lower_1`, `lower_2`, ...) and
+    theta_2 <= 0 (`upper_1`, ...); each has a contact of the same name. An impact passes its speed on within its cell only.
     """
 
     coupling: float = 0.1  # kappa = stiffness of a spring times length squared, over K2; at least 0
@@ -56,18 +56,18 @@ class CellChain(LayeredCell):
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
-        """Two for each cell, in the order of the coordinates."""
+        """Two contacts for each cell, in the order of the coordinates."""
         return _contacts_at(self.coordinates)
 
     def cell(self) -> TwoLayer:
-        """One cell by itself; its numbers may be symbols, which no checks could be made of."""
+        """One cell by itself, made without checks, as its numbers may be symbols."""
         cell = object.__new__(TwoLayer)
         for name, value in self.cell_numbers.items():
             object.__setattr__(cell, name, value)
         return cell
 
     def mass_matrix(self, theta: Any) -> Any:
-        """That of each cell, in blocks."""
+        """The mass matrices of the cells, as blocks on the diagonal."""
         size, one = 2 * self.cells, self.cell()
         matrix: list[list[Any]] = [[0.0] * size for _ in range(size)]
         for i in range(0, size, 2):
@@ -84,7 +84,7 @@ class CellChain(LayeredCell):
         return found
 
     def force(self, t: Any, theta: Any, velocity: Any, load: Load) -> tuple[Any, ...]:
-        """That of each cell, and of the springs between the cells."""
+        """The forces of each cell, and those of the springs between the cells."""
         one, u, forces = self.cell(), self.displacements(theta), []
         for i in range(self.cells):
             angles, rates = theta[2 * i : 2 * i + 2], velocity[2 * i : 2 * i + 2]
@@ -109,13 +109,13 @@ class CellChain(LayeredCell):
         return sum(one.potential_energy(theta[i : i + 2]) for i in range(0, size, 2)) + self.coupling * between / 2
 
     def margins(self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Load) -> dict[str, Any]:
-        """What each layer lacks to the kinematic limit (errata 19, 20), where the motion stops."""
+        """The distance of each layer from the kinematic limit (errata 19, 20), where the motion stops."""
         signs = (1, -1) * self.cells
         angles = zip(self.coordinates, signs, theta, strict=True)
         return {f"{name}_kinematic_limit": 2 * (math.pi - self.beta0) - sign * angle for name, sign, angle in angles}
 
     def margin_kind(self, margin: str) -> MarginKind:
-        """All are limits."""
+        """All margins are limits."""
         return MarginKind.LIMIT
 
 

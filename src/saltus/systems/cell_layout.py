@@ -1,4 +1,4 @@
-"""The places of a two-layer cell's hinges, sliders and masses, for drawing it."""
+"""The positions of a two-layer cell's hinges, sliders and masses, for drawing it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class CellLayout:
     end at `slider_j_in` and `slider_j_out`, whose distance is the transverse jump of the slider.
 
     The rotational springs of the paper's points A and B measure the angle beta_j. It is the same at opposite corners of a
-    layer, and the paper's text does not say which it takes: here A is the lower right and B the upper right hinge.
+    layer, and the paper does not say which corners it means: here A is the lower right hinge and B the upper right one.
     """
 
     points: dict[str, Point]  # of every hinge, slider and mass, by name

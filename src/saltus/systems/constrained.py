@@ -22,7 +22,7 @@ def constrained_acceleration(
     r has the force of each friction that slides, -mu_k N s with its direction s in `slides`, 0 where it sticks.
 
     q and v are scalars where there is one coordinate, else tuples. The matrix is eliminated from its first row on, without
-    pivots: those of a positive definite matrix are positive.
+    exchanging rows, as the pivots of a positive definite matrix are positive.
     """
     mass, force = mass_and_force(model, t, q, v, load)
     for friction, normal, s in zip(model.frictions, normal_forces(model, t, q, v, load), slides, strict=True):
@@ -56,7 +56,7 @@ def reactions(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any)
 
 
 def stick_margins(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any) -> list[Any]:
-    """mu_s N - l and mu_s N + l of each friction, one after the other, with the force l = (M a - r)_i that holds it."""
+    """mu_s N - l and mu_s N + l of each friction, one after the other, with the force l = (M a - r)_i that makes it stick."""
     lacking, margins = _lacking(model, t, q, v, a, load), []
     for friction, normal in zip(model.frictions, normal_forces(model, t, q, v, load), strict=True):
         force, most = lacking[model.coordinates.index(friction.coordinate)], friction.most * normal
@@ -65,12 +65,12 @@ def stick_margins(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: 
 
 
 def normal_forces(model: Model, t: Any, q: Any, v: Any, load: Any) -> tuple[Any, ...]:
-    """N of each friction.
+    """The normal force N of each friction.
 
     Raises
     ------
     ParameterError
-        Not as many as there are frictions.
+        The model does not give as many as it has frictions.
     """
     given = model.normal_forces(t, q, v, load) if model.frictions else ()
     if len(given) != len(model.frictions):
@@ -80,7 +80,7 @@ def normal_forces(model: Model, t: Any, q: Any, v: Any, load: Any) -> tuple[Any,
 
 
 def _lacking(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any) -> list[Any]:
-    """M a - r: what is to act on each coordinate for these accelerations."""
+    """M a - r, the force that must act on each coordinate besides r for these accelerations."""
     mass, force = mass_and_force(model, t, q, v, load)
     return [sum(m * x for m, x in zip(row, a, strict=True) if not _is_zero(m)) - r for row, r in zip(mass, force, strict=True)]
 
@@ -109,5 +109,5 @@ def _held(entry: Any, i: int, j: int, free: Sequence[Any]) -> Any:
 
 
 def _is_zero(entry: Any) -> bool:
-    """Whether an entry is 0 whatever the state: not merely here."""
+    """Whether an entry is 0 for every state: the number 0, and not a symbol or an array."""
     return isinstance(entry, (int, float)) and entry == 0

@@ -8,7 +8,7 @@ from typing import Any
 from saltus.errors import ParameterError
 from saltus.public_functions import answering
 
-MOST = 12  # Which of them are closed is found by trying, 2^n choices at worst.
+MOST = 12  # The most contacts: which of them are closed is found by trying, with 2^n choices at worst.
 
 
 @answering("__init__")
@@ -16,7 +16,7 @@ MOST = 12  # Which of them are closed is found by trying, 2^n choices at worst.
 class Contact:
     """A contact that keeps a coordinate q on one side of a position p: its gap is sign (q - p) >= 0.
 
-    While it is closed, q stays at p, and its reaction, an impulse or a force along q times the sign, is not negative.
+    While it is closed, q stays at p. Its reaction, the impulse or force on q times the sign, is not negative.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class Contact:
     position
         p, a number, which may be one of the model's parameters.
     group
-        The group to whose other contacts an impact passes speed on (`transfer`).
+        The contact's group: an impact passes speed on to the other contacts of its group (`transfer`).
     restitution
         e of the impacts that close it, in [0, 1]; by default that of the system's impact law.
 
@@ -68,7 +68,7 @@ def check_contacts(model: Any) -> None:
     Raises
     ------
     ParameterError
-        Two of one name, an unknown coordinate, a model with sides, two contacts that leave a coordinate no room.
+        Two contacts of one name, an unknown coordinate, a model with sides, two contacts that leave a coordinate no room.
     """
     contacts, kind = model.contacts, type(model).__name__
     names = [contact.name for contact in contacts]

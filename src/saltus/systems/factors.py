@@ -1,4 +1,4 @@
-"""Several numbers that belong together, each with a dotted path of its own."""
+"""A tuple of numbers in one field of a model or law, each with a dotted path of its own."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Dry friction with a known normal force: what may hold a coordinate at the velocity of the ground that it slides on."""
+"""Dry friction with a known normal force, which may hold a coordinate at the velocity of the ground on which it slides."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from saltus.public_functions import answering
 
 Number = Any  # a float, or a parameter of the model while its equations are traced
 
-MOST_FRICTIONS = 6  # Which of them stick, and which way the others slide, is found by trying, 3^n choices at worst.
+MOST_FRICTIONS = 6  # The most frictions: which stick, and which way the others slide, is found by trying 3^n choices at worst.
 
 
 @answering("__init__")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Friction:
-    """Coulomb's friction along a coordinate q on a ground that moves with the speed w, under the normal force N of the model:
+    """Coulomb friction along a coordinate q on a ground that moves with the speed w, under the normal force N of the model:
 
-        it slides, and the force on it is -mu_k N sign(q' - w), or it sticks, q' = w, and the force is at most mu_s N.
+        it slides, and the force on q is -mu_k N sign(q' - w), or it sticks, q' = w, and the force is at most mu_s N.
 
     N is the model's `normal_forces`, a function of time, state and load, but not of accelerations.
 
@@ -49,7 +49,7 @@ class Friction:
 
     @property
     def limit(self) -> str:
-        """The name of what ends a motion where the normal force does not press any more."""
+        """The name of the limit at which a motion ends, as the normal force does not press any more."""
         return f"normal force of {self.name}"
 
     @property
@@ -64,8 +64,8 @@ def check_frictions(model: Any) -> None:
     Raises
     ------
     ParameterError
-        Too many, two of one name or on one coordinate, an unknown coordinate or one with a contact, a model with sides, a
-        coefficient below 0, mu_s < mu_k.
+        Too many frictions, two of one name or on one coordinate, an unknown coordinate or one with a contact, a model with sides,
+        a coefficient below 0, mu_s < mu_k.
     """
     frictions, kind = model.frictions, type(model).__name__
     names = [part.name for part in (*model.contacts, *frictions)]

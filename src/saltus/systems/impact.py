@@ -1,4 +1,4 @@
-"""Impact laws: the velocity just after contact, and the energy that goes with it (paper, section "Impact scenarios")."""
+"""Impact laws: the velocity just after an impact, and the change of energy (paper, section "Impact scenarios")."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from saltus.systems.model import Model
 
 
 class ImpactLaw:
-    """What turns the velocity before an impact into the one after it, v-, s -> v+, s+, for any model.
+    """The law by which the velocity and side before an impact give those after it, v-, s -> v+, s+, for any model.
 
     `velocity_after` is traced, and may use comparisons within NumPy's where, and maximum and minimum, besides what an
     acceleration may use.
@@ -25,10 +25,10 @@ class ImpactLaw:
     __slots__ = ()
 
     def velocity_after(self, model: Model, t: Any, velocity: Any, side: Any, next_side: Any, load: Load) -> Any:
-        """The velocity that an impact at `t` lets through from `side` to `next_side`.
+        """The velocity after an impact at `t` through which the motion passes from `side` to `next_side`.
 
-        Both velocities are rates of the coordinate, and the result has the sign of `velocity`: what does not pass but bounces
-        gets its sign turned by the model's `reset`.
+        Both velocities are rates of the coordinate, and the result has the sign of `velocity`: where the motion bounces, the
+        model's `reset` turns the sign.
         """
         raise NotImplementedError
 
@@ -52,7 +52,8 @@ class ImpactLaw:
 class VelocityReduction(ImpactLaw):
     """v+ = e v-, with a constant factor e in [0, 1] (paper, `vel_red`).
 
-    In a model with contacts the other ones take the speed on if it says so (`transfers`), else each contact turns it back.
+    In a model with several contacts the others of the group take over the speed if the model `transfers`; else each contact
+    turns its own speed back.
 
     Parameters
     ----------
@@ -77,13 +78,13 @@ class VelocityReduction(ImpactLaw):
         return self.e * velocity
 
     def restitution_matrix(self, model: Model) -> list[list[Any]]:
-        """e at the contact that is hit, or at the others."""
+        """e at the contact that is hit or, if the model `transfers`, at the others of its group."""
         contacts = model.contacts
         return [[self.e if _passes(model, a, b) else 0.0 for a in contacts] for b in contacts]
 
 
 def _passes(model: Model, a: Contact, b: Contact) -> bool:
-    """Whether an impact at contact `a` leaves its speed with `b`: with the others of its group, or else with itself."""
+    """Whether an impact at contact `a` gives its speed to `b`: another one of its group if the model `transfers`, else itself."""
     return a is not b and a.group == b.group if model.transfers else a is b
 
 
@@ -92,9 +93,9 @@ def _passes(model: Model, a: Contact, b: Contact) -> bool:
 class EnergyRestitution(ImpactLaw):
     """T+ = r T-, with T the model's kinetic energy, ground velocities and unequal masses included (`rest_def`, errata 5, 26).
 
-    T on the new side is a quadratic a v^2 + b v + c in the velocity; its root of the sign of v- is taken, and of two such the
-    one on the same side of the minimum -b / (2 a) as v-. At r = 1 that is v+ = v- for m = 0 and nu' = 0. Where no root has the
-    sign of v- (small v- on a moving ground) the motion cannot go on, and is refused with the instant and the numbers.
+    T on the new side is a quadratic a v^2 + b v + c in the velocity. The root with the sign of v- is taken; if both have this
+    sign, the one on the same side of the minimum -b / (2 a) as v-. At r = 1 this gives v+ = v- for m = 0 and nu' = 0. If no root
+    has the sign of v- (small v- on a moving ground) the motion cannot go on, and is refused with the instant and the numbers.
 
     Parameters
     ----------
@@ -138,7 +139,7 @@ class InelasticImpact(ImpactLaw):
     """Frictionless, perfectly inelastic contact: the momentum balance of the layer that is not hit fixes v+ (errata 25).
 
     For the metainterface v+ = -cos(2 beta0) v- from lower to upper and -cos(2 beta0)/(1+m) v- back, whatever the ground does, for
-    45 to 135 degrees; outside that range both contacts act and the motion stops. For the rocking block Housner's factor.
+    45 to 135 degrees; outside that range both contacts act and the motion stops. For the rocking block it is Housner's factor.
 
     Examples
     --------
@@ -153,5 +154,5 @@ class InelasticImpact(ImpactLaw):
         return model.inelastic_factor(side) * velocity
 
     def restitution_matrix(self, model: Model) -> list[list[Any]]:
-        """All zeros: no contact turns anything back, and the balances of momentum say what the others do."""
+        """All zeros: no contact gives speed back, and the balance of momentum determines the other velocities."""
         return [[0.0] * len(model.contacts) for _ in model.contacts]

@@ -1,4 +1,4 @@
-"""The impact pair: a mass that slides freely in a case, between the case's two walls."""
+"""The impact pair: a case on a spring, and a mass that slides freely between the case's two walls."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from saltus.systems.model import Model
 @answering("__init__")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImpactPair(Model):
-    """A case on a spring, z, and a mass in it at x from the case's middle, |x| <= d, an impact damper:
+    """An impact damper: a case on a spring, at z, and a mass in it at the distance x from the case's middle, |x| <= d:
 
         z'' + c z' + k z + mu (z'' + x'') = F(tau),    mu (z'' + x'') = 0 while no wall pushes.
 
@@ -66,7 +66,7 @@ class ImpactPair(Model):
         return load.force(t) - self.damping * velocity[0] - self.stiffness * q[0], 0.0 * q[1]
 
     def mirror(self, load: Load) -> Load:
-        """The force reversed."""
+        """The load with the force reversed."""
         return reversed_load(load, "force")
 
     def kinetic_energy(self, t: Any, q: Any, velocity: Any, side: Any, load: Load) -> Any:

@@ -1,4 +1,4 @@
-"""The numbers of a cell of the metainterface, which its reduced model, that of both layers and chains of cells share."""
+"""The numbers of a cell of the metainterface, which its reduced model, its two-layer model and chains of cells share."""
 
 from __future__ import annotations
 
@@ -36,5 +36,5 @@ class LayeredCell(Model):
 
     @property
     def cell_numbers(self) -> dict[str, Any]:
-        """The numbers of the cell, with which another model of it is made."""
+        """The numbers of the cell, from which another model of it can be made."""
         return {each.name: getattr(self, each.name) for each in fields(LayeredCell)}

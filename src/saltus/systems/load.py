@@ -20,7 +20,7 @@ class Channel:
     Parameters
     ----------
     signal
-        What it carries; None is 0.
+        The signal of the channel; None is 0.
     frequency
         The base frequency of the load, or None.
 
@@ -145,6 +145,6 @@ def _check_quantity(name: str, signal: Signal) -> None:
 
 
 def reversed_load(load: Load, ending: str) -> Load:
-    """A load with the signs of those channels turned whose names end so, such as "horizontal"."""
+    """A load in which the channels whose names have this ending, such as "horizontal", have the other sign."""
     signals = {name: scaled(signal, -1.0) if name.endswith(ending) else signal for name, signal in load.channels.items()}
     return Load(frequency=load.frequency, **signals)

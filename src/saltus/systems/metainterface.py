@@ -31,9 +31,9 @@ class Metainterface(LayeredCell):
     The channels `horizontal`, `vertical` are H, V on the upper mass, `lower_horizontal`, `lower_vertical` are h H, v V on the
     lower one, `ground_horizontal`, `ground_vertical` the displacements zeta, nu of the ground.
 
-    Margins, which a motion may be asked to stop at: `line_limit`, pi - beta0 - abs(theta) (`line_cond`, n = 1);
+    Margins, at which a motion may be asked to stop: `line_limit`, pi - beta0 - abs(theta) (`line_cond`, n = 1);
     `kinematic_limit`, 2 (pi - beta0) - abs(theta), where the slider closes again (errata 20); `reaction`, the closed
-    layer's reaction with the sign that keeps it closed (errata 21): with the lower layer open
+    layer's reaction, positive while it keeps the layer closed (errata 21): with the lower layer open
     -R2 = cos(2 beta0 + theta) theta'' - sin(2 beta0 + theta) theta'^2 + (H - zeta'') sin beta0 - (V - nu'') cos beta0
     >= 0, with the upper one open R1 = -cos(2 beta0 - theta) theta'' - sin(2 beta0 - theta) theta'^2
     - [(1+h) H - (1+m) zeta''] sin beta0 - [(1+v) V - (1+m) nu''] cos beta0 >= 0, rows two and one of `eomnl`.
@@ -51,7 +51,7 @@ class Metainterface(LayeredCell):
     dissipation_ratio
         c = C1 / C2, at least 0.
     smoothing
-        B, with which sgn(theta) becomes tanh(B theta / 2) (`smoothing`); None is exact.
+        B, if sgn(theta) is to be replaced by tanh(B theta / 2) (`smoothing`); None keeps the exact sign.
 
     Examples
     --------
@@ -89,11 +89,11 @@ class Metainterface(LayeredCell):
 
     @property
     def sides(self) -> tuple[int, ...]:
-        """Two sides, or none where the sign is smoothed."""
+        """Two sides, or none if the sign is smoothed."""
         return (1, -1) if self.smoothing is None else ()
 
     def acceleration(self, t: Any, theta: Any, velocity: Any, side: Any, load: Load) -> Any:
-        """theta'' of `gov_eqn_theta_long`, with `side` for sgn(theta), or with `smoothing` in its place."""
+        """theta'' of `gov_eqn_theta_long`, with `side` or, with `smoothing`, tanh(B theta / 2) in place of sgn(theta)."""
         if self.smoothing is None:
             lower, sign, size = (1 + side) / 2, side, abs(theta)
         else:

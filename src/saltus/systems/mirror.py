@@ -1,4 +1,4 @@
-"""The mirror symmetry of a system: images of its states, contacts and frictions, and the check of what a model says of it."""
+"""The mirror symmetry of a system: images of its states, contacts and frictions, and the check of the model's `mirror`."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from saltus.systems.constrained import normal_forces
 from saltus.systems.impact import ImpactLaw
 from saltus.systems.model import Model
 
-PROBE = (0.3711, 0.2931, 0.6173)  # A time, a gap and a velocity of no meaning, at which two equations that differ do so.
-MIRROR_ROUNDING = 1e-9  # Accelerations and velocities of mirror images differ by rounding alone.
+PROBE = (0.3711, 0.2931, 0.6173)  # An arbitrary time, gap and velocity, at which equations that differ have different values.
+MIRROR_ROUNDING = 1e-9  # Accelerations and velocities of mirror images may differ by this, relatively, through rounding.
 
 
 def image_places(model: Model) -> list[int]:
-    """For each coordinate of a mirror image, the number of that whose negative it is."""
+    """For each coordinate of a mirror image, the index of the original coordinate whose negative it is."""
     return [model.coordinates.index(name) for name in model.images]
 
 
@@ -27,7 +27,7 @@ def image_of(model: Model, states: np.ndarray) -> np.ndarray:
 
 
 def contact_images(model: Model, impact: ImpactLaw) -> tuple[int, ...] | None:
-    """For each contact, and then each friction, the number of its mirror image; None where one has none, or another law."""
+    """The index of the mirror image of each contact, then of each friction; None if one has no image or the laws differ."""
     contacts, frictions, count = model.contacts, model.frictions, len(model.contacts)
     found = []
     for contact in contacts:
@@ -51,12 +51,12 @@ def contact_images(model: Model, impact: ImpactLaw) -> tuple[int, ...] | None:
 
 
 def check_mirror(system: Any, mirrored: Any, side: int) -> None:
-    """Refuse a mirrored system in which the mirror image of a state moves otherwise than the state's motion does, mirrored.
+    """Refuse a mirrored system in which the mirror image of a state does not move as the mirror image of the state's motion.
 
     Raises
     ------
     ParameterError
-        With the class of the model.
+        The error names the class of the model.
     """
     model, (t, distance, v) = system.model, PROBE
     count, places = len(model.coordinates), image_places(model)

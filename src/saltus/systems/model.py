@@ -14,7 +14,7 @@ from saltus.systems.friction import Friction
 
 
 class MarginKind(StrEnum):
-    """What it means that a motion of a model passes one of its margins.
+    """The meaning of a margin: what it says of the mechanism that a motion passes it.
 
     Examples
     --------
@@ -90,7 +90,7 @@ class Model:
         return self.units[self.coordinates.index(coordinate)] if self.units else "1"
 
     def margin_kind(self, margin: str) -> MarginKind:
-        """What it means to pass one of the margins.
+        """The meaning of one of the margins.
 
         Parameters
         ----------
@@ -101,7 +101,7 @@ class Model:
 
     @property
     def sides(self) -> tuple[int, ...]:
-        """The numbers of the smooth modes; none where the model has `contacts`, which say what is free."""
+        """The numbers of the smooth modes; none if the model has `contacts`, which determine what is free."""
         return (1, -1) if type(self).contacts is Model.contacts else ()
 
     @property
@@ -110,7 +110,7 @@ class Model:
         return 0.0
 
     def acceleration(self, t: Any, theta: Any, velocity: Any, side: Any, load: Any) -> Any:
-        """The acceleration on the given side; of a model that gives its `force`, while no contact and no friction acts.
+        """The acceleration on the given side; for a model that gives its `force`, that without contacts and frictions.
 
         Parameters
         ----------
@@ -139,7 +139,7 @@ class Model:
 
     @property
     def images(self) -> tuple[str, ...]:
-        """For each coordinate of a mirror image the one whose negative it is: its own, unless the mirror swaps two."""
+        """For each coordinate of a mirror image, the original one whose negative it is: the same, unless the mirror swaps two."""
         return self.coordinates
 
     @property
@@ -153,7 +153,7 @@ class Model:
         return bool(self.contacts or self.frictions)
 
     def normal_forces(self, t: Any, theta: Any, velocity: Any, load: Any) -> tuple[Any, ...]:
-        """N of each friction, which must stay positive: the motion ends where one does not. By default 1: mu N is then mu.
+        """The normal force N of each friction; the motion ends where one is not positive. By default it is 1, so that mu N is mu.
 
         Parameters
         ----------
@@ -196,7 +196,7 @@ class Model:
         raise NotImplementedError(f"{type(self).__name__} has contacts, so it must define force(t, theta, velocity, load)")
 
     def gap(self, theta: Any, side: Any) -> Any:
-        """What is positive inside the mode `side` and zero at contact.
+        """The gap, which is positive inside the mode `side` and zero at contact.
 
         Parameters
         ----------
@@ -224,7 +224,7 @@ class Model:
         load
             The load, whose channels are called with the time: `load.horizontal(t)`.
         impact
-            The impact law, whose `velocity_after` gives the velocity that it lets through.
+            The impact law, whose `velocity_after` gives the velocity after the impact without a change of sign.
         """
         return -side, impact.velocity_after(self, t, velocity, side, -side, load)
 
@@ -292,8 +292,8 @@ class Model:
     def mirror(self, load: Any) -> Any:
         """The load under which -theta(t) is a motion wherever theta(t) is one under `load`, or None without such a symmetry.
 
-        a(t, -theta, -theta', -side, mirrored load) = -a(t, theta, theta', side, load), and the reset alike; a state at which that
-        does not hold is refused.
+        a(t, -theta, -theta', -side, mirrored load) = -a(t, theta, theta', side, load) must hold, and the same for the reset; this
+        is checked at one state, and a mirror for which it does not hold is refused.
 
         The mirror turns the signs of all coordinates, velocities and sides; it does not shift the time. Of several coordinates
         it may swap some, see `images`.
@@ -309,7 +309,7 @@ class Model:
 def check_sides(model: Model | type[Model]) -> None:
     """Refuse sides that no contact has, and a wall without a reset that turns the motion round.
 
-    Of a class whose sides depend on its numbers nothing is known yet, and nothing is refused.
+    A class whose sides depend on its numbers is not refused, as its sides are not known yet.
     """
     name, sides = getattr(model, "__name__", type(model).__name__), model.sides
     if isinstance(sides, property):

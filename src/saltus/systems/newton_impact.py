@@ -21,8 +21,9 @@ class NewtonImpact(ImpactLaw):
     """0 <= J _|_ v+ + E v- >= 0 at all contacts whose gap is 0, with the rates v of the gaps and the impulses J (Moreau).
 
     E has the restitution of each contact on its diagonal, the transfer g between contacts of one group, and 0 elsewhere. A
-    contact with an impulse is left with -e_i v_i- less g times the other ones' v-. For g = 0 the energy lost at an impact is
-    1/2 sum J_i (1 - e_i) |v_i-| on fixed ground. A transfer may gain energy: see `energy_gain`.
+    contact with an impulse has after the impact the rate -e_i v_i- less g times the rates v- of the others in its group. For
+    g = 0 the energy lost at an impact is 1/2 sum J_i (1 - e_i) |v_i-| on fixed ground. A transfer may raise the energy: see
+    `energy_gain`.
 
     Parameters
     ----------
@@ -49,7 +50,7 @@ class NewtonImpact(ImpactLaw):
         object.__setattr__(self, "e", Factors(float(x) for x in self.e) if several else float(self.e))
 
     def restitution_matrix(self, model: Model) -> list[list[Any]]:
-        """E, with a contact's own restitution where it has one."""
+        """E; a contact's own restitution takes the place of the law's if it has one."""
         contacts = model.contacts
         factors = self.e if isinstance(self.e, Factors) else (self.e,) * len(contacts)
         if len(factors) != len(contacts):
@@ -63,11 +64,11 @@ class NewtonImpact(ImpactLaw):
 
 @answered
 def energy_gain(model: Model, impact: ImpactLaw) -> dict[str, float]:
-    """By how much an impact at each contact may raise the kinetic energy, as a share of what the impact at most takes; <= 0: not.
+    """The largest relative gain of kinetic energy by an impact at each contact; the energy is not raised where it is <= 0.
 
-    With the contacts of all other coordinates closed, at rest and the impact the only one: the rates of the gaps after it are
-    -E v- where an impulse acts, coordinates without a contact keep their momentum, and (v+' M v+) / (v-' M v-) - 1 is the share,
-    on fixed ground and in the position where these contacts are closed. For two layers it is positive where
+    The contacts of all other coordinates are taken as closed and at rest. The rates of the gaps after the impact are then -E v-
+    where an impulse acts, coordinates without a contact keep their momentum, and the gain is (v+' M v+) / (v-' M v-) - 1, on
+    fixed ground and in the position where these contacts are closed. For two layers it is positive where
     M_ss e_s^2 + 2 cos(2 beta0) e_s g + M_jj g^2 > M_ss, s the layer that is hit.
 
     Parameters
@@ -87,7 +88,7 @@ def energy_gain(model: Model, impact: ImpactLaw) -> dict[str, float]:
 
 
 def energy_gains(model: Any, impact: Any, shape: tuple[int, ...] = ()) -> dict[str, np.ndarray]:
-    """`energy_gain` of a model and a law, or of twins of them (see `substitute`) whose numbers may be arrays of that shape."""
+    """`energy_gain` of a model and a law, or of copies of them (see `substitute`) whose numbers are arrays of this shape."""
     contacts, names = model.contacts, model.coordinates
     places = [names.index(contact.coordinate) for contact in contacts]
     matrix, gain = impact.restitution_matrix(model), {}

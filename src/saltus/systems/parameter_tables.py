@@ -11,7 +11,8 @@ from saltus.errors import ParameterError, near
 from saltus.systems.parameters import numbers
 from saltus.systems.system import System
 
-# Rows of parameters, of which each makes a system; of more, those with a least or largest value and as many more, evenly.
+# Up to this number of rows of parameters, a system is made of each; of more, those with a least or largest value are checked, and
+# as many more, evenly spaced.
 MOST_CHECKED = 32
 
 
@@ -21,7 +22,7 @@ def parameter_table(system: System, parameters: Any) -> dict[str, Any]:
     Raises
     ------
     ParameterError
-        No mapping, or a path that leads elsewhere.
+        No mapping, or a path that leads to no number.
     """
     if parameters is None:
         return {}
@@ -32,7 +33,7 @@ def parameter_table(system: System, parameters: Any) -> dict[str, Any]:
     known = [path for path, _ in numbers(system)]
     for path in parameters:
         if path not in known:
-            system.get(str(path))  # refuses what leads nowhere
+            system.get(str(path))  # refuses a path that leads nowhere
             raise ParameterError(f"{path} is not a number, so it cannot be varied; {near(str(path), known)}", "parameters")
     return dict(parameters)
 
@@ -43,7 +44,7 @@ def check_parameters(system: System, columns: Mapping[str, np.ndarray]) -> None:
     Raises
     ------
     ParameterError
-        Of the system; or orders of harmonics that are not whole.
+        Values that the system refuses, or orders of harmonics that are not whole.
     """
     for path, values in columns.items():
         if path.endswith(".order") and not np.equal(values, np.round(values)).all():
@@ -55,7 +56,7 @@ def check_parameters(system: System, columns: Mapping[str, np.ndarray]) -> None:
 
 
 def _chosen(rows: np.ndarray) -> Iterable[int]:
-    """All rows, or where they are many the extreme ones and some between."""
+    """The rows to be checked: all, or if they are many, those with extreme values and some others."""
     if len(rows) <= MOST_CHECKED:
         return range(len(rows))
     even = np.linspace(0, len(rows) - 1, MOST_CHECKED).astype(int)
@@ -78,7 +79,7 @@ def finite_array(name: str, given: Any) -> Any:
 
 
 def broadcast_arrays(arrays: dict[str, Any]) -> tuple[tuple[str, ...], tuple[int, ...], dict[str, Any], dict[str, np.ndarray]]:
-    """The dimensions of arrays together, the shape, the coordinates, and each array flat or as one number."""
+    """Arrays broadcast together: their dimensions, shape and coordinates, and each array in one row, or as one number."""
     import xarray
 
     named = {name: a for name, a in arrays.items() if isinstance(a, xarray.DataArray) and a.ndim}
@@ -117,14 +118,14 @@ def _aligned(named: dict[str, Any]) -> dict[str, Any]:
 def _coords(named: dict[str, Any], dims: tuple[str, ...]) -> dict[str, Any]:
     """The coordinates of DataArrays; an array along a dimension of its own name is the dimension's coordinate.
 
-    As in xarray's arithmetic, those on which two arrays do not agree are left out.
+    As in xarray's arithmetic, coordinates on which two arrays do not agree are left out.
     """
     coords: dict[str, Any] = {}
     unlike = set()
     for array in named.values():
         for name, values in array.coords.items():
             if name in dims and name not in array.dims:
-                continue  # one value of what is a dimension here
+                continue  # a scalar coordinate with the name of a dimension of the others
             if name in coords and not coords[name].variable.equals(values.variable):
                 unlike.add(name)
             coords[str(name)] = values

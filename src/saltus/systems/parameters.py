@@ -1,4 +1,4 @@
-"""Dotted paths: every number of a system has one name, read, changed, listed and replaced by symbols through it."""
+"""Dotted paths: the names by which the numbers of a system are read, changed, listed and replaced by symbols."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from saltus.systems.signals import Constant, Sum, as_signal
 
 
 def children(node: Any) -> dict[str, Any]:
-    """The named parts of a system's node: fields of a dataclass, channels of a load, terms of a sum, a law's factors."""
+    """The named parts of a part of a system: fields of a dataclass, channels of a load, terms of a sum, factors of a law."""
     if isinstance(node, Load):
         return {"frequency": node.frequency, **node.channels}
     if isinstance(node, (Sum, Factors)):
@@ -30,7 +30,7 @@ def _fields_of(kind: type) -> tuple[str, ...]:
 
 
 def is_number(value: Any) -> bool:
-    """Whether a leaf is a number of the system (a switch or a name is part of its structure)."""
+    """Whether a leaf is a number of the system; switches and names belong to its structure."""
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
@@ -56,7 +56,7 @@ def replace(node: Any, changes: Mapping[str, Any], where: str = "") -> Any:
     Raises
     ------
     ParameterError
-        A path that leads nowhere, with the near ones; a value that the new whole refuses.
+        A path that leads nowhere; the error names similar ones. A value that the new system refuses.
     """
     parts, below = children(node), defaultdict[str, dict[str, Any]](dict)
     for path, value in changes.items():
@@ -83,7 +83,7 @@ def replace(node: Any, changes: Mapping[str, Any], where: str = "") -> Any:
 
 
 def substitute(node: Any, leaf: Callable[[str, float], Any], prefix: str = "") -> Any:
-    """A twin of `node` with every number replaced by `leaf(path, number)`, built without its checks: for tracing."""
+    """A copy of `node` with every number replaced by `leaf(path, number)`, made without checks: for tracing."""
     twin: Any
     if isinstance(node, Constant):
         twin = object.__new__(Constant)

@@ -1,7 +1,7 @@
-"""What every pulse is: a load that begins and ends. The shapes are in `pulses.py`.
+"""The base class of pulses, loads that begin and end. The shapes are in `pulses.py`.
 
-A pulse is not smooth where it begins and where it ends: these two instants are breakpoints of the motion, as a record's samples
-are, so no step of an integration crosses them. In an ensemble each trajectory has its own.
+A pulse is not smooth where it begins and where it ends: these two instants are breakpoints of the motion, as the samples of a
+record are, so that no step of an integration crosses them. In an ensemble each motion has its own breakpoints.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ TIME, RATE = {"converts": "time"}, {"converts": "rate"}  # the metadata of field
 class Pulse(Signal):
     """A load that begins at `start` and lasts for `length`; a pulse by itself is 0 before and after.
 
-    `quantity` says what it is: a `force`, or of the ground an `acceleration`. The ground then moves from rest, and goes on with
-    the velocity that the pulse leaves it.
+    `quantity` says which quantity it is: a `force`, or an `acceleration` of the ground. The ground then moves from rest, and goes
+    on with the velocity that it has at the end of the pulse.
 
     Contract: a subclass gives `length` and `shape(since, n)`, the n-th derivative of the quantity at `since` after the start,
-    or for n = -1 and -2 its integrals from there; `moving` names the numbers that move the beginning or the end.
+    or for n = -1 and -2 its integrals from the start; `moving` names the numbers on which the beginning or the end depends.
     """
 
     amplitude: float
@@ -56,15 +56,15 @@ class Pulse(Signal):
 
     @property
     def length(self) -> Any:
-        """How long it lasts."""
+        """The duration of the pulse."""
         raise NotImplementedError
 
     def shape(self, since: Any, n: int) -> Any:
-        """The n-th derivative of the quantity at `since` after the start; of n = -1 and -2 the integrals from the start."""
+        """The n-th derivative of the quantity at `since` after the start; for n = -1 and -2 the integrals from the start."""
         raise NotImplementedError
 
     def derivative(self, t: Any, frequency: Any, order: int = 0) -> Any:
-        """The quantity at `t`, or what follows from it by differentiation or integration from rest."""
+        """The channel at `t`, or its derivative: the quantity, differentiated or integrated from rest."""
         n = order - QUANTITY_ORDER[self.quantity]
         since, within, after = t.pulse(self) if hasattr(t, "pulse") else self._clocks(np.asarray(t, dtype=float))
         if n > 0 or (n == 0 and not self.holds):
@@ -83,7 +83,7 @@ class Pulse(Signal):
 
 
 def in_other_units(pulse: Pulse, by_time: Callable[..., Any], by_rate: Callable[..., Any], unit: float, factor: float) -> Pulse:
-    """The pulse with its times and rates taken through the unit of time, and `factor` times as high."""
+    """The pulse with its times and rates converted by the unit of time, and `factor` times as high."""
     of = {"time": by_time, "rate": by_rate}
     fields = {f.name: of[f.metadata["converts"]] for f in dataclasses.fields(pulse) if f.metadata.get("converts") in of}
     changed = {name: convert(getattr(pulse, name), unit) for name, convert in fields.items()}

@@ -14,8 +14,8 @@ from saltus.errors import ParameterError
 from saltus.public_functions import answering
 from saltus.systems.pulse import RATE, TIME, Pulse
 
-RICKER_REACH = 7.0  # of the argument u: beyond it (2 u^2 - 1) exp(-u^2) is below 1e-19, which no sum of the load notices
-# Each the last one's slope.
+RICKER_REACH = 7.0  # the largest argument u: beyond it (2 u^2 - 1) exp(-u^2) is below 1e-19, less than rounding of the load
+# Each function is the derivative of the one before.
 SINUSOIDS: tuple[Callable[[Any], Any], ...] = (np.sin, np.cos, lambda x: -np.sin(x), lambda x: -np.cos(x))
 
 
@@ -127,8 +127,8 @@ class MavroeidisPapageorgiou(Pulse):
 
         amplitude / 2 (1 + cos(frequency r / gamma)) cos(frequency r + phase),    r from -h to h, h = pi gamma / frequency
 
-    r is the time since its middle and `gamma` > 1 says how many oscillations it has. Of the ground it is a `velocity`, or, if
-    asked, an `acceleration`. It begins and ends with the value 0.
+    r is the time since its middle and `gamma` > 1 says how many oscillations it has. As a ground motion it is a `velocity`, or an
+    `acceleration` if `quantity` says so. It begins and ends with the value 0.
 
     Parameters
     ----------
@@ -169,8 +169,8 @@ class MavroeidisPapageorgiou(Pulse):
         return 2.0 * math.pi * self.gamma / self.frequency
 
     def shape(self, since: Any, n: int) -> Any:
-        """The sum of the three sinusoids that the product of cosines is, differentiated or integrated."""
-        begin = self.phase - math.pi * self.gamma + 0.5 * math.pi  # of the carrier as a sine, at the start
+        """The product of cosines as a sum of three sinusoids, differentiated or integrated."""
+        begin = self.phase - math.pi * self.gamma + 0.5 * math.pi  # the phase of the carrier, written as a sine, at the start
         carrier = sinusoid(self.frequency, begin, since, n)
         above = sinusoid(self.frequency * (1.0 + 1.0 / self.gamma), begin - math.pi, since, n)
         below = sinusoid(self.frequency * (1.0 - 1.0 / self.gamma), begin + math.pi, since, n)
@@ -263,8 +263,8 @@ class Ramp(Pulse):
 class Chirp(Pulse):
     """amplitude sin(frequency s + (end_frequency - frequency) s^2 / (2 duration)) for 0 <= s <= duration: a linear sweep.
 
-    Of the ground its velocity and its displacement are no elementary functions: a model or an impact law that reads them is
-    refused.
+    As a ground acceleration its velocity and its displacement are no elementary functions; models and impact laws that read these
+    are refused.
 
     Parameters
     ----------
@@ -277,7 +277,7 @@ class Chirp(Pulse):
     frequency
         The angular frequency at the start, above 0.
     end_frequency
-        That at the end, above 0.
+        The angular frequency at the end, above 0.
     duration
         How long it lasts, above 0.
 

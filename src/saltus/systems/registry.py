@@ -50,7 +50,7 @@ def register(cls: T) -> T:
     Raises
     ------
     ParameterError
-        What is neither; a model whose sides and reset do not go together.
+        A class that is neither; a model whose sides and reset do not go together.
 
     Examples
     --------

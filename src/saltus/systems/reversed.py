@@ -5,7 +5,7 @@ With s = -t and theta(s) its velocity is -theta'(t), and the acceleration is the
     d2 theta / ds2 = a(-s, theta, -d theta / ds),
 
 so damping becomes anti-damping. A load F(t) becomes F(-s): its harmonics mean + A sin(n W t + phi) become
-mean + A sin(n W s + pi - phi). An impact v- -> v+ = e v- is met from behind: -v+ comes in and -v- = -v+ / e goes out.
+mean + A sin(n W s + pi - phi). An impact v- -> v+ = e v- is reversed: -v+ is the velocity before and -v- = -v+ / e after it.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ RESET_SPEEDS = (0.3, 2.0)  # speeds at which a reset is compared with its invers
 
 @dataclass(frozen=True, slots=True)
 class VelocityGain(ImpactLaw):
-    """v+ = v- / e, with e in (0, 1]: `VelocityReduction(e)` backward."""
+    """v+ = v- / e, with e in (0, 1]: `VelocityReduction(e)` reversed in time."""
 
     e: float = 1.0
 
@@ -45,13 +45,13 @@ def reversed_system(system: System) -> System:
     """The system whose motions are those of `system` run backward, with the same parameters by the same paths.
 
     `simulate(reversed_system(system), theta=q, velocity=-v, time=-t, duration=T)` ends at the state that the forward motion had
-    a time T before it came to (q, v) at t, with the velocity's sign turned. Rest has no past: a motion that comes to rest forward
-    comes from everywhere, so a backward one never meets it.
+    a time T before it came to (q, v) at t, with the other sign of the velocity. Rest at the contact has no past: motions come to
+    it from many states in a finite time, and a backward motion never reaches it.
 
     Parameters
     ----------
     system
-        What moves forward.
+        The system to be reversed.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def reversed_system(system: System) -> System:
 
 
 def reversed_model(model: Model) -> Model:
-    """The model of which motions run backward; its numbers keep their names."""
+    """The model whose motions run backward; its numbers keep their names."""
     fields = {f.name: getattr(model, f.name) for f in dataclasses.fields(model)}  # type: ignore[arg-type]
     result: Model = _reversed_class(type(model))(**fields)  # type: ignore[arg-type]
     return result
@@ -100,7 +100,7 @@ def _reversed_signal(signal: Signal) -> Signal:
 
 
 class _BackwardLoad:
-    """A load already reversed in time, as the forward model reads it: first derivatives with their sign turned back."""
+    """A load that is reversed in time, as the forward model reads it: with first derivatives of the original sign."""
 
     def __init__(self, load: Any) -> None:
         self._load = load

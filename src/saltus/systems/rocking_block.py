@@ -23,7 +23,7 @@ class RockingBlock(Model):
 
         theta'' = -zeta'' cos(alpha - abs(theta)) - s (1 + nu'') sin(alpha - abs(theta))
 
-    The block is taken to stay on the ground: for nu'' < -1 it would leave it, which nothing here says.
+    The block is assumed to stay on the ground: for nu'' < -1 it would leave it, which is not checked.
     A motion stops, `overturned`, when the block lies on its side: pi/2 - abs(theta) = 0.
 
     Parameters

@@ -1,4 +1,4 @@
-"""Impact scenarios: what happens at an impact, by the states before and after it (paper, Table 1, erratum 16)."""
+"""Impact scenarios: an impact classified by the states before and after it (paper, Table 1, erratum 16)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Two = tuple[float, float]
 
 
 class Scenario(Enum):
-    """What the impacting layer does (`impact_condition1` to `impact_condition3`).
+    """The behaviour of the impacting layer (`impact_condition1` to `impact_condition3`).
 
     Examples
     --------
@@ -37,7 +37,7 @@ class LayerState(NamedTuple):
 
 
 class NamedImpact(NamedTuple):
-    """An impact named: the scenario, the impacting layer s (1 lower, 2 upper) and the numbers of deformed layers."""
+    """A classified impact: the scenario, the impacting layer s (1 lower, 2 upper) and the numbers of deformed layers."""
 
     scenario: Scenario
     layer: int

@@ -45,7 +45,7 @@ def from_dict(kind: str, data: Any) -> Any:
     name = fields.pop("type")
     if not isinstance(name, str):
         raise ParameterError(f"{kind}.type must be a name in quotes, got {shown(name)}", f"{kind}.type")
-    from saltus.systems.registry import find  # of all models, impact laws and pulses, none of which is needed to write one
+    from saltus.systems.registry import find  # it imports all models, impact laws and pulses, which writing does not need
 
     return build(find(kind, name), fields, kind)
 
@@ -63,7 +63,7 @@ def read_signal(data: Any, where: str) -> Any:
 
 
 def signal_class(data: Mapping[str, Any], where: str) -> type[Signal]:
-    """What a table of a signal is: the pulse that its `type` names; without one a `Record`, if it has samples, or a `Harmonic`.
+    """The class of a signal's table: the pulse that its `type` names or, without one, `Record` if it has samples, or `Harmonic`.
 
     Raises
     ------

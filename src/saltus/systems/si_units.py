@@ -1,4 +1,4 @@
-"""SI data of a cell, and the dimensionless numbers that stand for them (paper, `timeT` to `displ_ratio1`, `dim_less`)."""
+"""SI data of a cell, and the dimensionless numbers that follow from them (paper, `timeT` to `displ_ratio1`, `dim_less`)."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ class PhysicalCell:
     upper_stiffness
         K2, the stiffness of the upper layer's springs, N m / rad.
     lower_mass
-        M1, that on the lower layer, kg.
+        M1, the mass on the lower layer, kg.
     lower_stiffness
-        K1, that of the lower layer, N m / rad; None is K2.
+        K1, the stiffness of the lower layer's springs, N m / rad; None is K2.
     upper_damping
         C2, the damping of the upper layer, N m s / rad.
     lower_damping
-        C1, that of the lower layer, N m s / rad; None is C2.
+        C1, the damping of the lower layer, N m s / rad; None is C2.
 
     Raises
     ------
@@ -155,7 +155,7 @@ class PhysicalCell:
         return TwoLayer(beta0=beta0, **self.ratios)
 
     def load(self, si: Load) -> Load:
-        """The dimensionless load of one written in SI: rad/s, N, and for the ground m, m/s or m/s^2; records in s.
+        """The dimensionless form of a load in SI units: rad/s, N, and for the ground m, m/s or m/s^2; times of records in s.
 
         Parameters
         ----------
@@ -175,7 +175,7 @@ class PhysicalCell:
         return self._convert(load, mul, truediv, 1)
 
     def _convert(self, load: Load, by_time: Callable[..., Any], by_rate: Callable[..., Any], power: int) -> Load:
-        """The load with times and rates taken through the unit of time, and values times the `power` of their unit."""
+        """The load with times and rates converted by the unit of time, and values multiplied by the `power` of their unit."""
         units = self.units
 
         def convert(signal: Signal, quantity: str) -> Signal:

@@ -1,7 +1,7 @@
 """Signals: how one load channel varies with time. A constant, a harmonic, a record of samples, a pulse (`pulses.py`), or a sum.
 
-A signal answers one question, its value or its first or second derivative at a time `t`, for numbers, for arrays,
-and for the symbolic time with which a model is traced (an object with the methods `phase`, `record` and `pulse`).
+A signal gives its value or its first or second derivative at a time `t`: a number, an array, or the symbolic time with
+which a model is traced (an object with the methods `phase`, `record` and `pulse`).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from saltus.public_functions import answering
 
 
 class Signal:
-    """What a load channel carries.
+    """The signal of a load channel.
 
     Contract: `derivative(t, frequency, order)` returns the value (order 0), or its first or second derivative with
     respect to the dimensionless time tau, at `t` (number, array or symbolic time); `frequency` is the base frequency
@@ -140,7 +140,7 @@ def _samples(where: str, name: str, given: Any) -> np.ndarray:
         samples = np.array(given)
     except (TypeError, ValueError):
         samples = np.array(0.0)
-    if samples.ndim != 1 or samples.dtype.kind not in "fiub":  # of complex numbers a part would be left out
+    if samples.ndim != 1 or samples.dtype.kind not in "fiub":  # complex numbers would lose their imaginary part
         raise ParameterError(f"{where}: {name} must be a list of numbers, got {shown(given)}", name)
     return samples.astype(float)
 
@@ -154,7 +154,7 @@ class Record(Signal):
     * `acceleration` (ground): linear between samples, integrated twice exactly from rest at the first sample.
     * `velocity`, `displacement` (ground): a cubic spline through the samples, so that the acceleration is continuous.
 
-    Outside its samples a ground record has no acceleration: the ground goes on with the velocity it has.
+    Outside its samples a ground record has no acceleration: the ground goes on with the velocity that it has there.
 
     Parameters
     ----------
@@ -163,9 +163,9 @@ class Record(Signal):
     value
         The samples, (n,).
     quantity
-        What they are: "force", or of a ground channel "displacement", "velocity" or "acceleration".
+        The quantity of the samples: "force", or for a ground channel "displacement", "velocity" or "acceleration".
     scale
-        What every sample is multiplied by.
+        The factor by which every sample is multiplied.
     source
         The file that it came from.
 
@@ -264,7 +264,7 @@ class Record(Signal):
 
 
 def as_signal(value: Any, name: str) -> Signal:
-    """A number becomes a `Constant`; a signal stays what it is; anything else is refused."""
+    """A signal from a number (a `Constant`) or a signal (itself); anything else is refused."""
     if isinstance(value, Signal):
         return value
     check_number(name, value)
@@ -291,7 +291,7 @@ def scaled(signal: Signal, factor: float) -> Signal:
 
 
 def vanishes(signal: Signal) -> bool:
-    """Whether the signal is 0 at all times, as its numbers say."""
+    """Whether the signal is 0 at all times, judged by its numbers."""
     if isinstance(signal, Sum):
         return all(vanishes(term) for term in signal.terms)
     if isinstance(signal, Record):

@@ -24,7 +24,7 @@ from saltus.systems.serial import from_dict, to_dict
 @answering("__init__", "with_", "get", "from_dict", "from_json", "from_toml")
 @dataclass(frozen=True, kw_only=True)
 class System:
-    """What moves, and all that is needed to repeat the motion.
+    """A model, its load and its impact law: all that is needed to repeat a motion.
 
     `System(model=Metainterface(beta0=...), load=Load(...), impact=VelocityReduction(1.0))`. Every number has a dotted path:
     `model.damping`, `load.frequency`, `load.horizontal.amplitude`, `load.vertical`, `impact.e`.
@@ -34,14 +34,14 @@ class System:
     model
         The equations of motion.
     load
-        What acts on it; by default nothing.
+        The load that acts on it; by default none.
     impact
-        What happens at an impact; by default the velocity is kept (e = 1).
+        The impact law; by default the velocity is kept (e = 1).
 
     Raises
     ------
     ParameterError
-        A load channel that the model does not read, or cannot as it is.
+        A load channel that the model does not read, or one that cannot act on it.
 
     Examples
     --------
@@ -92,12 +92,12 @@ class System:
         changes
             The new parts by their dotted paths.
         more
-            The same for paths without a dot: model=..., load=..., impact=....
+            New parts by paths without a dot: model=..., load=..., impact=....
 
         Raises
         ------
         ParameterError
-            A path that leads nowhere, with the near ones, or a value that is refused there.
+            A path that leads nowhere (the error names similar ones), or a value that is refused there.
         """
         system: System = replace(self, {**(changes or {}), **more})
         return system
@@ -131,14 +131,15 @@ class System:
         return dict(numbers(self))
 
     def mirrored(self) -> System | None:
-        """The system in which the mirror image of theta, -theta, moves as theta does in this one, or None without the symmetry.
+        """The system in which -theta(t) is a motion wherever theta(t) is one in this system; None without the symmetry.
 
-        Of several coordinates it is that of `Model.images`; contacts and frictions must be images of one another, with one law.
+        With several coordinates the mirror image may swap some (`Model.images`); contacts and frictions must be images of one
+        another, with the same laws.
 
         Raises
         ------
         ParameterError
-            A `mirror` of the model that is no such symmetry, as a state shows.
+            A `mirror` of the model that is no such symmetry, as a test at one state shows.
         """
         load = self.model.mirror(self.load)
         if load is None or contact_images(self.model, self.impact) is None:
@@ -159,7 +160,7 @@ class System:
         Parameters
         ----------
         data
-            What `to_dict` gave.
+            A dictionary as `to_dict` returns it.
         """
         if not isinstance(data, Mapping):
             raise ParameterError(f"a system is a table with a model, a load and an impact law, got {shown(data)}", "data")
@@ -222,17 +223,17 @@ def _parsed(text: str, parse: Callable[[str], Any], language: str) -> Any:
         return parse(text)
     except RecursionError:
         raise ParameterError(f"this is not the {language} of a system: it is nested too deeply", "text") from None
-    except (TypeError, ValueError, AttributeError) as error:  # no text, or no such text
+    except (TypeError, ValueError, AttributeError) as error:  # not a text, or not one of this format
         raise ParameterError(f"this is not the {language} of a system: {error!s:.120}", "text") from None
 
 
 def check_system(system: Any, asking: str, *, coordinates: int | None = None, several_contacts: bool = False) -> None:
-    """Refuse what is no System, or one whose model has more contacts or another number of coordinates than `asking` is for.
+    """Refuse anything but a System whose model has the contacts and the number of coordinates that `asking` is for.
 
     Raises
     ------
     ParameterError
-        With what `asking` takes.
+        The error says which systems `asking` takes.
     """
     if not isinstance(system, System):
         raise ParameterError(f"{asking} takes a System(model=..., load=..., impact=...), got {shown(system)}", "system")

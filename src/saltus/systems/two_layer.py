@@ -30,8 +30,8 @@ class TwoLayer(LayeredCell):
         f_2 = [H - zeta''] sin(beta0 - theta_2) - [V - nu''] cos(beta0 - theta_2).
 
     A layer that is closed stays at theta_j = 0 while its contact pushes. Impacts follow the system's law (`NewtonImpact`), and
-    what the contacts do is exact, whichever layers are open. With m = 0 the mass matrix is singular where sin S = 0, that is
-    beta_1 + beta_2 = pi: there a motion with both layers open ends, as the massless hinge between them has no motion of its own.
+    contacts are treated exactly, whichever layers are open. With m = 0 the mass matrix is singular where sin S = 0, that is
+    beta_1 + beta_2 = pi: a motion with both layers open ends there, as nothing determines how the massless lower mass moves.
 
     Angles and velocities are pairs (lower, upper) of numbers or arrays; matrices have the shape (2, 2), or (2, 2, ...) for
     arrays. Energies are per K2. The load channels are those of `Metainterface`.
@@ -68,7 +68,7 @@ class TwoLayer(LayeredCell):
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
-        """The lower layer's, theta_1 >= 0, and the upper layer's, theta_2 <= 0."""
+        """The contact of the lower layer, theta_1 >= 0, and that of the upper layer, theta_2 <= 0."""
         return CONTACTS
 
     @property
@@ -149,7 +149,7 @@ class TwoLayer(LayeredCell):
         return _matrix(kappa_1, 0 * kappa_1, 0 * kappa_2, kappa_2)
 
     def force(self, t: Any, theta: Any, velocity: Any, load: Load) -> tuple[Any, Any]:
-        """r = f - C theta' - D theta'^2 - K theta, what accelerates the layers."""
+        """r = f - C theta' - D theta'^2 - K theta, the moments that accelerate the layers."""
         twist, push = np.sin(self._sum(theta)), self.load_vector(t, theta, load)
         viscous = self.damping * self.dissipation_ratio * velocity[0]
         return (
@@ -158,7 +158,7 @@ class TwoLayer(LayeredCell):
         )
 
     def constraint_reactions(self, t: Any, theta: Any, velocity: Any, acceleration: Any, load: Load) -> tuple[Any, Any]:
-        """(R_1, R_2) = M theta'' + C theta' + D theta'^2 + K theta - f, what contacts must supply (erratum 21).
+        """(R_1, R_2) = M theta'' + C theta' + D theta'^2 + K theta - f, the reactions of the contacts (erratum 21).
 
         Both vanish in free motion. A closed layer (theta_j = theta_j' = theta_j'' = 0) stays closed while R_1 >= 0 or R_2 <= 0.
 
@@ -221,7 +221,7 @@ class TwoLayer(LayeredCell):
         return self._push(t, theta, load, 0.0, 0.0)
 
     def margins(self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Load) -> dict[str, Any]:
-        """What each layer lacks to the straight line and to the kinematic limit (errata 19, 20)."""
+        """The distance of each layer from the straight line and from the kinematic limit (errata 19, 20)."""
         opening = math.pi - self.beta0
         return {
             "lower_line_limit": opening - theta[0],

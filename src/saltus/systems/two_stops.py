@@ -27,7 +27,7 @@ class TwoStops(Model):
     left
         d_1, the coordinate of the left stop.
     right
-        d_2, that of the right one, above d_1.
+        d_2, the coordinate of the right stop, above d_1.
 
     Examples
     --------
@@ -60,7 +60,7 @@ class TwoStops(Model):
         return load.force(t) - self.damping * velocity - self.stiffness * x
 
     def mirror(self, load: Load) -> Load | None:
-        """The force reversed, for d_1 = -d_2; None otherwise."""
+        """The load with the force reversed, for d_1 = -d_2; None otherwise."""
         return reversed_load(load, "force") if self.left == -self.right else None
 
     def kinetic_energy(self, t: Any, x: Any, velocity: Any, side: Any, load: Load) -> Any:

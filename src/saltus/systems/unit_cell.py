@@ -157,7 +157,7 @@ class UnitCell:
         phi
             The misalignment, rad; any shape.
         layer
-            1 for the lower one, 2 for the upper one.
+            1 for the lower layer, 2 for the upper one.
         past_line
             Whether the layer has gone past the straight line, beta_j > pi.
 
@@ -247,7 +247,7 @@ class UnitCell:
         return np.where(closed, moving, rate * slope / np.where(closed, 1.0, np.sin(phi)))[()]
 
     def small_phi(self, theta: Numbers) -> Any:
-        """abs(phi) = sqrt(abs(theta) sin(beta0) / psi), its limit for theta -> 0 (`fundamentalproperty`), rad.
+        """abs(phi) = sqrt(abs(theta) sin(beta0) / psi), the leading term of `phi` for theta -> 0 (`fundamentalproperty`), rad.
 
         Parameters
         ----------
@@ -257,14 +257,14 @@ class UnitCell:
         return np.sqrt(np.abs(theta) * math.sin(self.beta0) / self.psi)
 
     def layout(self, theta_1: float = 0.0, theta_2: float = 0.0, *, misaligned: tuple[int, int] = (1, 1)) -> CellLayout:
-        """Where every hinge, slider and mass is, in units of l from the lower left hinge; `misaligned` holds the signs of phi_j.
+        """The positions of all hinges, sliders and masses, in units of l from the lower left hinge.
 
         Parameters
         ----------
         theta_1
             The opening of the lower layer, rad, at least 0.
         theta_2
-            That of the upper one, rad, at most 0.
+            The opening of the upper layer, rad, at most 0.
         misaligned
             The signs of phi_1 and phi_2.
 

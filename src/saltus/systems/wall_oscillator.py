@@ -16,7 +16,7 @@ from saltus.systems.model import Model
 class WallOscillator(Model):
     """x'' + c x' + k x = F(tau), free while x < d; at the wall x = d the velocity turns round, v+ = -e v-.
 
-    It has one mode, ended at the wall and entered again, and rests on the wall while F - k d > 0.
+    It has one mode, which an impact at the wall ends and begins anew. It can rest at the wall while F - k d > 0.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class WallOscillator(Model):
 
     @property
     def sides(self) -> tuple[int, ...]:
-        """One side: the wall lets nothing through."""
+        """One side, as the wall turns every motion back."""
         return (1,)
 
     @property

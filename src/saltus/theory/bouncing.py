@@ -19,14 +19,14 @@ from saltus.theory.loaded_equilibria import zeros_of_slope
 
 @dataclass(frozen=True, slots=True)
 class Peaks:
-    """The two peaks of a periodic motion through theta = 0, and the velocities between which the impacts change it.
+    """The two peaks of a periodic motion through theta = 0, and the speeds at theta = 0 on both sides.
 
     Attributes
     ----------
     theta_min
         The peak on the upper side, rad, below 0.
     theta_max
-        That on the lower side, rad, above 0.
+        The peak on the lower side, rad, above 0.
     lower_speed
         abs(theta') at theta = 0 on the lower side.
     upper_speed
@@ -57,12 +57,12 @@ class Peaks:
 def peaks(system: System, theta0: float) -> Peaks:
     """Both peaks of the undamped motion from theta0, at rest, under constant loads (`pot_balance`, errata 6 and 7).
 
-    The side that starts is the sign of theta0. The speed at theta = 0 follows from P(theta0) = M v^2 / 2, the system's
-    impact law takes it over, and the other peak is where M v^2 / 2 = P again; with m = 0 and e = 1 this is
+    The motion starts on the side of theta0's sign. The speed at theta = 0 follows from P(theta0) = M v^2 / 2, the system's
+    impact law gives the speed on the other side, and the other peak is where M v^2 / 2 = P again; with m = 0 and e = 1 this is
 
         k theta_max^2 / 2 - V sin(beta0 + theta_max) = theta_min^2 / 2 - V sin(beta0 + abs(theta_min))
 
-    With m > 0 a constant velocity (e = 1) changes the energy at each impact and back again; r = 1 keeps it.
+    With m > 0 and e = 1 one impact changes the energy and the next one changes it back; with r = 1 each keeps it.
 
     Parameters
     ----------
@@ -74,8 +74,8 @@ def peaks(system: System, theta0: float) -> Peaks:
     Raises
     ------
     ParameterError
-        Damping; an impact law under which the motion does not repeat; theta0 = 0, or one from which theta = 0
-        is not reached; a peak beyond the kinematic limit; a load that varies in time.
+        Damping; an impact law under which the motion does not repeat itself; a theta0 that is 0 or from which theta = 0 is not
+        reached; a peak beyond the kinematic limit; a load that varies in time.
 
     Examples
     --------
@@ -256,7 +256,7 @@ def _fall_speed(layer: Layer, peak: float) -> float:
 
 
 def _after_impact(system: System, speed: float, side: int) -> float:
-    """The speed that the impact law lets through from `side`, whose motion comes back with velocity -side speed."""
+    """The speed after an impact that ends `side`, of a motion that comes to the contact with the velocity -side speed."""
     return abs(float(system.impact.velocity_after(system.model, 0.0, -side * speed, side, -side, system.load)))
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from saltus.errors import ParameterError
 from saltus.systems import Harmonic, System, WallOscillator
 
-SAMPLES_PER_TURN = 64  # samples per period of the faster frequency, among which the maxima inside an orbit are looked for
+SAMPLES_PER_TURN = 64  # samples in the shorter of the load's and the free period, by which the maxima of an orbit are found
 
 
 @dataclass(frozen=True)
@@ -20,13 +20,13 @@ class WallOrbits:
     """The orbits of x'' + c x' + k x = mean + A sin(Omega tau + phase), v+ = -e v-, with one impact in q forcing periods.
 
     From here on x is counted from mean / k, so that the wall is at `wall`. Phi is the free flow over q T, T = 2 pi / Omega,
-    D = det Phi = e^(-c q T), tr its trace, and Delta = det(1 - Phi) = 1 - tr + D. The steady response comes back by itself, so
-    the free part y of the motion obeys y- = Phi [y- - (0, (1 + e) v)]; it is linear in the speed v before the impact:
+    D = det Phi = e^(-c q T), tr its trace, and Delta = det(1 - Phi) = 1 - tr + D. The steady response is periodic by itself, so
+    that the free part y of the motion must satisfy y- = Phi [y- - (0, (1 + e) v)]; it is linear in the speed v before the impact:
 
         y- = v (alpha, beta),     alpha = -(1 + e) Phi_12 / Delta,     beta = (1 + e) (D - Phi_22) / Delta
 
-    What is left of the wall and of v is the steady response at the impact, P = wall - alpha v and Q = (1 - beta) v, and with
-    gamma = (1 - beta) / Omega the amplitude of the load is a quadratic in v:
+    The steady response at the impact has the rest of the position and of the velocity, P = wall - alpha v and Q = (1 - beta) v.
+    With gamma = (1 - beta) / Omega the square of the load's amplitude is a quadratic in v:
 
         A^2 = Z^2 [(wall - alpha v)^2 + gamma^2 v^2],     Z = abs(k - Omega^2 + i c Omega)
 
@@ -221,7 +221,7 @@ class WallOrbit:
 
     @property
     def impact_time(self) -> float:
-        """tau of one impact, in [0, 2 pi / Omega); q = 2, 3, ... has as many orbits, shifted by whole forcing periods."""
+        """tau of one impact, in [0, 2 pi / Omega); for q = 2, 3, ... there are q orbits, shifted by whole forcing periods."""
         family = self.family
         position, velocity = self._steady
         behind = math.atan2(family.impedance.imag, family.impedance.real)  # phase by which the response lags a cosine
@@ -240,12 +240,13 @@ class WallOrbit:
 
     @property
     def admissible(self) -> bool:
-        """Whether x < d all the time between two impacts; if not, there is no such orbit."""
+        """Whether x < d all the time between two impacts; if not, the solution is no motion."""
         return self.clearance > 0
 
     @cached_property
     def clearance(self) -> float:
-        """d - x at the highest maximum inside the orbit, infinite without one; 0 is another grazing, below 0 not admissible.
+        """d - x at the highest maximum between impacts, infinite if there is none; at 0 the orbit grazes, below 0 it is not
+        admissible.
 
         Maxima are found among samples, `SAMPLES_PER_TURN` in the shorter of the load's and the free period.
         """
@@ -261,7 +262,7 @@ class WallOrbit:
         return family.wall - max(heights) if heights else math.inf
 
     def state(self, tau: Any) -> tuple[Any, Any]:
-        """x and x' at tau, any shape, of the orbit with an impact at `impact_time`; just after the impact where tau is one.
+        """x and x' at tau, any shape, of the orbit with an impact at `impact_time`; at an impact, x' is the velocity after it.
 
         Parameters
         ----------
@@ -273,12 +274,12 @@ class WallOrbit:
 
     @property
     def _steady(self) -> tuple[float, float]:
-        """P and Q: the steady response at the impact."""
+        """P and Q: position and velocity of the steady response at the impact."""
         alpha, beta, _ = self.family._slopes
         return self.family.wall - alpha * self.speed, (1 - beta) * self.speed
 
     def _between(self, since: Any) -> tuple[Any, Any]:
-        """x - mean / k and x' so long after an impact."""
+        """x - mean / k and x' at the times `since` an impact."""
         family, (position, velocity) = self.family, self._steady
         free_x, free_v = family.wall - position, -family.restitution * self.speed - velocity
         phi11, phi12, phi21, phi22 = free_flow(since, family.stiffness, family.damping)
@@ -300,8 +301,8 @@ def wall_orbits(system: System, period: int = 1) -> WallOrbits:
     Raises
     ------
     ParameterError
-        Another model, a force that is not one harmonic of order 1, damping that is not below critical,
-        a period below 1, an impact law that is not v+ = -e v-, a resonance without damping, at which no speed (or any) fits.
+        Another model, a force that is not one harmonic of order 1, damping that is not below critical, a period below 1, an
+        impact law that is not v+ = -e v-, a resonance without damping, at which no speed or every speed is a solution.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""One open layer under constant loads, as a one-sided oscillator: what every closed form here starts from."""
+"""One open layer under constant loads, as a one-sided oscillator: the basis of the closed forms in this room."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class Layer:
         return self.outward * np.sin(self.beta0 + x) + self.vertical * np.cos(self.beta0 + x)
 
     def potential(self, x: Any) -> Any:
-        """P (`pot_balance0`), zero at x = 0; the differences of sines are taken as products, exact for small x.
+        """P (`pot_balance0`), zero at x = 0; the differences of sines are written as products, which are exact for small x.
 
         Parameters
         ----------
@@ -105,7 +105,7 @@ class Layer:
         return self.stiffness - self.outward * np.cos(self.beta0 + x) + self.vertical * np.sin(self.beta0 + x)
 
     def eigenvalues(self, curvature: float) -> tuple[complex, complex]:
-        """The eigenvalues of the motion linearised where d2P/dx2 = `curvature`, the faster growing one first.
+        """The eigenvalues of the motion linearised at an equilibrium with d2P/dx2 = `curvature`, the faster growing one first.
 
         Parameters
         ----------
@@ -191,7 +191,7 @@ def metainterface(system: System) -> Metainterface:
 
 
 def constant_loads(system: System) -> dict[str, float]:
-    """The value of each force channel; a constant displacement of the ground does nothing.
+    """The value of each force channel; a constant displacement of the ground has no effect.
 
     Raises
     ------

@@ -11,7 +11,7 @@ from itertools import pairwise
 from saltus.systems import System
 from saltus.theory.layer import Layer, layers
 
-MOMENT_ROUNDING = 4e-15  # moments below this share of a layer's scale are zero
+MOMENT_ROUNDING = 4e-15  # moments below this share of a layer's scale count as zero
 
 
 class Stability(Enum):
@@ -41,9 +41,9 @@ class LoadedEquilibrium:
     energy
         P(theta) - P(0), over K2.
     curvature
-        P''(theta); None at theta = 0, where it has a corner.
+        P''(theta); None at theta = 0, where P has a corner.
     eigenvalues
-        Those of the linearised motion, the faster growing one first; None at theta = 0.
+        The eigenvalues of the linearised motion, the faster growing one first; None at theta = 0.
     within_line
         Whether abs(theta) <= pi - beta0, the straight line.
 
@@ -121,7 +121,7 @@ def undeformed_stability(system: System) -> Stability | None:
 
 
 def zeros_of_slope(layer: Layer) -> Iterator[float]:
-    """The openings 0 < x <= 2 (pi - beta0) where P'(x) = 0, increasing; a double zero comes once."""
+    """The openings 0 < x <= 2 (pi - beta0) where P'(x) = 0, increasing; a double zero is given once."""
     from scipy.optimize import brentq
 
     nodes = [0.0, *layer.inflections(), layer.kinematic_limit]
@@ -135,9 +135,9 @@ def zeros_of_slope(layer: Layer) -> Iterator[float]:
 
 
 def slope_sign(layer: Layer) -> int:
-    """The sign of P' just inside the opening: of its first derivative at x = 0 that is not zero.
+    """The sign of P' at small openings: that of the first of P', P'', ... that is not zero at x = 0.
 
-    P''' is the push, and once P', P'' and P''' vanish the next one is the stiffness, above 0.
+    P''' is the push, and if P', P'' and P''' vanish the next derivative is the stiffness, above 0.
     """
     for value in (layer.slope(0.0), layer.curvature(0.0)):
         if sign := _sign(value, layer):
@@ -150,7 +150,7 @@ def _sign(value: float, layer: Layer) -> int:
 
 
 def _past_contact(layer: Layer, end: float, sign: int) -> float:
-    """A point after the zero at x = 0 where P' has the `sign` that it has just inside."""
+    """A small opening beyond the zero at x = 0, at which P' has the `sign` that it has at small openings."""
     x = end / 2
     while layer.slope(x) * sign <= 0:
         x /= 2

@@ -12,16 +12,16 @@ from saltus.systems import Metainterface, System
 
 @dataclass(frozen=True)
 class AmplitudeLimit:
-    """An amplitude that motions of the mechanism do not pass.
+    """An amplitude beyond which a motion is not one of the real mechanism.
 
     Attributes
     ----------
     name
-        Its name, that of the margin.
+        The name of the margin.
     value
-        The limit, rad; an array where it varies with a parameter that is one.
+        The limit, rad; an array if it varies with a parameter that is given as an array.
     meaning
-        What happens there.
+        The meaning of the limit, in words.
 
     Examples
     --------
@@ -42,7 +42,7 @@ def amplitude_limits(system: System, parameters: Mapping[str, Any] | None = None
     system
         What moves.
     parameters
-        Values, by dotted path, that take the place of those of the system; numbers or arrays.
+        Values, by dotted path, that replace those of the system; numbers or arrays.
 
     Examples
     --------

@@ -18,8 +18,8 @@ def pendulum_acceleration(system: System, tau: Numbers, theta: Numbers, velocity
 
         theta'' + C theta' + theta = cos(theta) (H - zeta'') - sin(theta) (V - nu'')
 
-    No sign of theta is left: sin(abs(theta) + pi/2) = cos(theta) and sgn(theta) cos(abs(theta) + pi/2) = -sin(theta),
-    so with e = 1 there is no impact to speak of.
+    The sign of theta drops out: sin(abs(theta) + pi/2) = cos(theta) and sgn(theta) cos(abs(theta) + pi/2) = -sin(theta),
+    so that with e = 1 an impact changes nothing.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ class Arc:
 
         x(t) = centre + e^(-decay t) [(start - centre) cos(w t) + (velocity + decay (start - centre)) / w sin(w t)]
 
-    It is evaluated as start (...) + velocity (...) + centre (1 - ...), which is exact for short t too.
+    It is evaluated as start (...) + velocity (...) + centre (1 - ...), which is accurate also for short t.
     """
 
     layer: Layer
@@ -47,7 +47,7 @@ class Arc:
     def impact_time(self) -> float | None:
         """The first t > 0 with x(t) = 0, or None if the layer stays open for good.
 
-        x' is zero every pi / w; the first minimum is the lowest one, so without a zero before it there is none at all.
+        x' is zero every pi / w; the first minimum is the lowest one, so that x has no zero at all if it has none before it.
         """
         from scipy.optimize import brentq
 
@@ -75,8 +75,8 @@ class LinearMotion:
     velocity_after
         (n,): theta' just after.
     arcs
-        The motion between impacts: the first arc from 0, the others from each impact; none from an impact that stops the
-        motion.
+        The motion between impacts: the first arc begins at 0, each other one at an impact; an impact that stops the motion begins
+        no arc.
     end
         The time up to which it is known: the next impact, or infinity if none follows.
 
@@ -147,7 +147,7 @@ def linear_motion(system: System, theta0: float, impacts: int) -> LinearMotion:
     True
     """
     check_number("theta0", theta0)
-    check_count("impacts", impacts, 1, 100_000)  # whose arcs are kept, each an object
+    check_count("impacts", impacts, 1, 100_000)  # the arc of each is kept as an object
     if theta0 == 0:
         raise ParameterError(f"theta0 must not be 0, where nothing moves, got {theta0!r}", "theta0")
     by_side = {layer.side: layer for layer in layers(system)}

@@ -130,10 +130,10 @@ def unloaded_fold(beta0: float) -> tuple[float, float]:
 
 
 def fold_horizontal(beta0: float, vertical: Numbers) -> Any:
-    """The abs(H) above which deformed equilibria exist for -sin(beta0) >= V, any shape of V (k = 1, beta0 < pi/2, errata 23).
+    """The abs(H) above which deformed equilibria exist for V <= -sin(beta0), any shape of V (k = 1, beta0 < pi/2, errata 23).
 
-    It is `fold_curve` at the opening with dV/dx = -x sin(beta0 + x) < 0, found by bisection; 0 below `unloaded_fold`, where they
-    exist without any H. It is never above Hcr.
+    It is the H of `fold_curve` at this V, found by bisection, as V falls with the opening, dV/dx = -x sin(beta0 + x) < 0. It is 0
+    below `unloaded_fold`, where the equilibria exist without any H, and never above Hcr.
 
     Parameters
     ----------
@@ -172,9 +172,9 @@ def is_monostable(beta0: float, horizontal: Numbers, vertical: Numbers) -> Any:
     """Whether the undeformed state is the only equilibrium of a symmetric system (k = 1) under constant H and V (errata 23).
 
     True where V cos(beta0) < -abs(H) sin(beta0), the domain of Fig. 8, and, if V < -sin(beta0) with beta0 < pi/2, abs(H) is
-    also below the fold of equilibria. Only the layer that H pushes open, and only before the straight line, needs
-    looking at: the other layer's push at beta0 + x is this one's at 2 pi - beta0 - x, so its equilibria come later.
-    Broadcasts; arrays of bool.
+    also below the fold of equilibria. It suffices to consider the layer that H pushes open, before the straight line: the push on
+    the other layer at beta0 + x is that on this one at 2 pi - beta0 - x, so that any other equilibrium implies one of this layer
+    at a smaller opening. Broadcasts; arrays of bool.
 
     Parameters
     ----------
@@ -200,7 +200,8 @@ def is_monostable(beta0: float, horizontal: Numbers, vertical: Numbers) -> Any:
 
 
 def paper_monostable(beta0: float, horizontal: Numbers, vertical: Numbers) -> Any:
-    """The domain as Fig. 8 states it, V cos(beta0) < -abs(H) sin(beta0): the undeformed state is stable there, but not alone.
+    """The domain of Fig. 8, V cos(beta0) < -abs(H) sin(beta0): the undeformed state is stable there, but not always the only
+    equilibrium.
 
     Parameters
     ----------
@@ -221,7 +222,7 @@ def paper_monostable(beta0: float, horizontal: Numbers, vertical: Numbers) -> An
 
 
 def static_angle(beta0: float, horizontal: float, vertical: float) -> float:
-    """theta_st, the equilibrium that the undeformed state gives way to as H grows past Hcr to its amplitude, V constant (k = 1).
+    """theta_st, the equilibrium that replaces the undeformed state as H grows beyond Hcr to its amplitude, V constant (k = 1).
 
     The smallest positive zero of P', stable because the loads push open at contact.
 
@@ -237,8 +238,8 @@ def static_angle(beta0: float, horizontal: float, vertical: float) -> float:
     Raises
     ------
     ParameterError
-        abs(H) <= Hcr, where the undeformed state holds and theta_st does not exist; no equilibrium
-        before the kinematic limit.
+        abs(H) <= Hcr, where the undeformed state is stable and theta_st does not exist; no equilibrium before the kinematic
+        limit.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What an impact does to velocity and energy: the restitution of inelastic contact, and r as against e."""
+"""The change of velocity and energy at an impact: the restitution of inelastic contact, and the relation of r and e."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class InelasticContact:
     restitution
         r = T+ / T- on a ground at rest.
     impulses
-        The impulses over theta'- of the constraints theta_1 >= 0 and theta_2 <= 0, the two rows of M [[theta']].
+        The impulses of the constraints theta_1 >= 0 and theta_2 <= 0 divided by theta'-, the two rows of M [[theta']].
 
     Examples
     --------
@@ -49,8 +49,8 @@ def inelastic_contact(beta0: float, mass_ratio: float, side: int) -> InelasticCo
         lower to upper:  theta'+ = -cos(2 beta0) theta'-           for every m
         upper to lower:  theta'+ = -cos(2 beta0) / (1+m) theta'-
 
-    Both keep r = cos^2(2 beta0) / (1+m) of the energy. Ground velocities are continuous, so they drop out of the jump. This
-    opens the other layer the right way for pi/4 < beta0 < 3 pi/4; otherwise its constraint acts too, and both stop (factor 0).
+    Both keep the share r = cos^2(2 beta0) / (1+m) of the energy. Ground velocities are continuous, so they drop out of the jump.
+    For pi/4 < beta0 < 3 pi/4 the other layer opens; otherwise its constraint acts too, and both layers stop (factor 0).
 
     Parameters
     ----------
@@ -88,9 +88,9 @@ def inelastic_contact(beta0: float, mass_ratio: float, side: int) -> InelasticCo
 def energy_factor(system: System, velocity: float, side: int, e: float, tau: float = 0.0) -> float:
     """r = T+ / T- of an impact that ends `side` at tau with theta'- = velocity, theta'+ = e theta'- (`rest_def_vel`, errata 5).
 
-    T is the model's kinetic energy, with its ground velocities and the mass that moves on each side; the paper's formula has
-    the vertical ground velocity with one sign on both sides. On a ground at rest r = e^2 / (1+m)^s, with m = 0 the e^2
-    of `rest_def_red`.
+    T is the model's kinetic energy, with the ground velocities and the mass that moves on each side; in the paper's formula the
+    vertical ground velocity has the same sign on both sides. On a ground at rest r = e^2 / (1+m)^s; with m = 0 this is e^2, as
+    in `rest_def_red`.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def velocity_factor(system: System, velocity: float, side: int, r: float, tau: f
     Raises
     ------
     ParameterError
-        velocity = 0, or none solves it (errata 26), with the instant and the velocity.
+        velocity = 0, or an equation without a solution (errata 26); the error names the instant and the velocity.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The free rigid rocking block: its periods, and the energy that an impact takes or gives (paper, appendix A)."""
+"""The free rigid rocking block: its periods, and the change of energy at an impact (paper, appendix A)."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ def rocking_period(theta0: Numbers, *, alpha: float) -> Any:
         p T0 = 4 u R_F(c^2 s^2, s^2 (c^2 + u^2), u^2 + c^2 s^2),
         u^2 = sin(alpha - theta0/2) sin(theta0/2),   c = cos(alpha/2),   s = sin((alpha - theta0)/2)
 
-    with R_F Carlson's symmetric elliptic integral: alpha - theta is an inverted pendulum (`EOM&Rock`). It is Legendre's
-    F(chi | cos^2((alpha - theta0)/2)) with tan(chi) = u / (c s), in a form that keeps its digits as theta0 nears alpha.
+    with R_F Carlson's symmetric elliptic integral: alpha - theta is an inverted pendulum (`EOM&Rock`). It equals Legendre's
+    F(chi | cos^2((alpha - theta0)/2)) with tan(chi) = u / (c s), but does not lose digits as theta0 approaches alpha.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def rocking_energy_jump(velocity: Numbers, *, alpha: float, e: float, ground_vel
 
 
 def rocking_energy_decreases(velocity: Numbers, *, alpha: float, e: float, ground_velocity: Numbers = 0.0) -> Any:
-    """Whether the impact lowers the kinetic energy, e < 1 (appendix A): if either condition holds (errata 12), not both:
+    """Whether an impact with e < 1 lowers the kinetic energy (appendix A): if at least one of two conditions holds (errata 12):
 
         theta' zeta' > 0,   or   abs(zeta') < (1 + e) / (2 cos(alpha)) abs(theta')
 
@@ -152,9 +152,10 @@ def rocking_energy_decreases(velocity: Numbers, *, alpha: float, e: float, groun
 
 
 def housner_restitution(alpha: float) -> float:
-    """r = (1 - (3/2) sin^2(alpha))^2, the energy kept when angular momentum about the new corner is (Housner 1963).
+    """r = (1 - (3/2) sin^2(alpha))^2, the share of the energy kept if the angular momentum about the new corner is conserved
+    (Housner 1963).
 
-    The velocity factor is its root, above 0 for sin^2(alpha) < 2/3.
+    The factor of the velocity is 1 - (3/2) sin^2(alpha), above 0 for sin^2(alpha) < 2/3.
 
     Parameters
     ----------

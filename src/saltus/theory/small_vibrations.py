@@ -14,7 +14,7 @@ from saltus.public_functions import Numbers
 from saltus.systems import System
 from saltus.theory.layer import Layer, layers
 
-UPRIGHT = 1e-15  # moments V cos(beta0) below this are the rounding of cos(pi/2)
+UPRIGHT = 1e-15  # moments V cos(beta0) below this count as 0: they are the rounding of cos(pi/2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,7 +209,7 @@ def upright_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
 def decayed_amplitude(cycle: Numbers, *, theta0: float, e: float) -> Any:
     """Amplitude theta_D of the n-th cycle, from peak to peak (`approx1`, errata 8): e^(4 (n-1)) theta0, n = 1, 2, ...
 
-    The paper prints e^(4n). Each impact takes e^2 off the energy, which is proportional to the amplitude while that is small.
+    The paper prints e^(4n). Each impact multiplies the energy by e^2; small amplitudes are proportional to the energy.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The quasi-static border of a stability chart: the loads under which rest alone is an equilibrium."""
+"""The quasi-static border of a stability chart: the border of the loads under which rest is the only equilibrium."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LOAD_PLANE = ("load.horizontal.amplitude", "load.vertical")  # the two parameter
 
 @dataclass(frozen=True, eq=False)
 class QuasiStaticBorder(Result):
-    """Both parts of the border over the vertical load V; the true border is the lesser of them (erratum 23).
+    """Both parts of the border over the vertical load V; the true border is the lower one (erratum 23).
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class QuasiStaticBorder(Result):
 
     @property
     def true(self) -> np.ndarray:
-        """The lesser of both."""
+        """The true border: the lower one of `critical` and `fold`."""
         return np.asarray(np.fmin(self.critical, self.fold))
 
     def to_xarray(self) -> xarray.Dataset:
@@ -105,7 +105,7 @@ def quasi_static_border(system: System, plane: tuple[str, ...], lowest: float) -
 def border_over(beta0: float, lowest: float) -> QuasiStaticBorder:
     """The border of the metainterface with k = 1 over V from `lowest` to 0."""
     start, end = subcritical_vertical(beta0), unloaded_fold(beta0)[0]
-    bend = end + (start - end) * np.linspace(0.0, 1.0, 101) ** 0.5  # the fold leaves the line at V = start as a power 3/2
+    bend = end + (start - end) * np.linspace(0.0, 1.0, 101) ** 0.5  # dense near V = start, where the fold leaves as a power 3/2
     ends = [np.linspace(lowest, end, 21), bend, np.linspace(end, start, 101), np.linspace(start, 0.0, 21)]
     vertical = np.unique(np.concatenate(ends))
     vertical = vertical[vertical >= lowest]

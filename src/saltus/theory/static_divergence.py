@@ -12,7 +12,7 @@ from saltus.theory.loaded_equilibria import MOMENT_ROUNDING, LoadedEquilibrium, 
 
 @dataclass(frozen=True, slots=True)
 class Divergence:
-    """The theta(0), at rest, from which the linearised motion does not return to theta = 0 (bullets after `minmin`).
+    """The initial theta(0), at rest, from which the linearised motion does not return to theta = 0 (bullets after `minmin`).
 
     Attributes
     ----------
@@ -68,9 +68,9 @@ def linear_equilibria(system: System) -> tuple[LoadedEquilibrium, ...]:
 def divergence(system: System) -> Divergence:
     """The divergence conditions under small rotations (bullets after `minmin`), any k, m and constant loads.
 
-    If the loads push a layer open at theta = 0 (V cos(beta0) > 0) every disturbance to its side leaves. If they hold it
-    closed (V cos(beta0) < 0) it diverges when k^P + V sin(beta0) < 0 and theta(0) lies beyond theta_A or theta_B. At
-    beta0 = pi/2 these are at 0: theta(0) > 0 diverges for V < -k, theta(0) < 0 for V < -1.
+    If the loads push a layer open at theta = 0 (V cos(beta0) > 0) the motion diverges from every disturbance to its side. If they
+    hold it closed (V cos(beta0) < 0) the motion diverges if k^P + V sin(beta0) < 0 and theta(0) lies beyond theta_A or theta_B.
+    At beta0 = pi/2 both are 0: the motion diverges from theta(0) > 0 for V < -k, from theta(0) < 0 for V < -1.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def divergence(system: System) -> Divergence:
 
 
 def _threshold(layer: Layer) -> float | None:
-    """The opening beyond which the layer diverges or settles open; 0 if from contact on, None if it always closes."""
+    """The opening beyond which the layer diverges or settles open; 0 if it does so from every opening, None if from none."""
     if slope_sign(layer) < 0:
         return 0.0
     kappa, push = float(layer.curvature(0.0)), float(layer.push(0.0))

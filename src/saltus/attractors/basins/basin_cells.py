@@ -1,4 +1,4 @@
-"""The cells of a grid of initial states: on which attractor each ends, computed at once or as a sweep."""
+"""The cells of a grid of initial states: the attractor on which the motion from each ends, computed at once or as a sweep."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Grid:
     plane: tuple[str, str]  # the variables along the horizontal and the vertical axis
     horizontal: np.ndarray  # (columns,)
     vertical: np.ndarray  # (rows,)
-    fixed: dict[str, float]  # all state variables in their order; those of the plane count for nothing
+    fixed: dict[str, float]  # all state variables in their order; the values of the two in the plane are not used
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -56,7 +56,7 @@ def cells(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, n
     Parameters
     ----------
     arguments
-        As `cell_arguments` makes them, plain as JSON.
+        The arguments that `cell_arguments` makes, in types that can be written as JSON.
     block
         Values along both axes, by the names of the state variables of the plane.
 
@@ -68,7 +68,7 @@ def cells(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, n
     Raises
     ------
     ParameterError
-        Arguments that were made where the system has other equations, or saltus another version.
+        Arguments of a system with other equations than it has here, or of another version of saltus.
     """
     system = System.from_dict(arguments["system"])
     check_provenance(arguments, system, "this part of the basins")
@@ -89,7 +89,7 @@ def _label_grid(labelling: Labelling, grid: Grid, progress: Progress = silent) -
 def computed_cells(
     system: System, labelling: Labelling, grid: Grid, rows: int, progress: Progress, **where: Any
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The same, as a sweep in chunks of `rows` of the grid if `where` says where they are kept or who computes them.
+    """Labels and times over the grid, by a sweep in chunks of `rows` of the grid if `where` has a store, workers or a scheduler.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def computed_cells(
     grid
         The initial states.
     rows
-        Of the grid, in a chunk.
+        The number of rows of the grid in a chunk.
     progress
         Called with the share of the cells that are done.
     where
@@ -140,7 +140,7 @@ def _plan(system: System, labelling: Labelling, grid: Grid, rows: int) -> Plan:
 
 
 def check_basin_store(path: Path, system: System) -> None:
-    """Refuse, before attractors are looked for, what is surely not the store of the basins of this system."""
+    """Refuse a store that is not one of the basins of this system, before attractors are looked for."""
     from saltus.sweep import BEGIN_ANEW, read_plan
 
     try:

@@ -1,8 +1,9 @@
-"""The curves that part the basins of a grid: stable manifolds of the saddles between them, found by tracking the edge.
+"""The curves between the basins of a grid: stable manifolds of the saddles on the boundary, found by edge tracking.
 
-Between two cells with different labels lies a state on the boundary. Halving brings two states with different ends to within
-rounding of it, and the motion from there stays by the boundary until rounding has grown: it comes near a saddle on it, if the
-boundary has one of a short period, and returns near to where it was. From there Newton's method finds the saddle orbit.
+Between two cells with different labels lies a state on the boundary. Repeated division of the interval brings two states with
+different ends to within rounding of it. The motion from there stays near the boundary until the rounding errors have grown. If
+there is a saddle orbit of a short period on the boundary, the motion comes near it and returns near to an earlier state; from
+this state Newton's method finds the saddle orbit.
 """
 
 from __future__ import annotations
@@ -29,13 +30,13 @@ class BoundarySettings:
     step: float = 0.01  # Distance between neighbouring points of a manifold, in half widths of the window.
     points: int = 8_000  # The largest number of points of a manifold on each side of a saddle.
     max_period: int = 6  # The longest period of saddles that are looked for, in forcing periods.
-    # The largest number of saddles, those of the shortest periods: where there are more, the manifold of each comes near all of
-    # the boundary.
+    # The largest number of saddles, which are those of the shortest periods. If there are more, the manifold of each comes near
+    # all of the boundary.
     saddles: int = 4
     edges: int = 12  # Number of places of the boundary from which the edge is tracked.
     tracked: int = 40  # Number of forcing periods for which it is tracked.
     cuts: int = 32  # Number of states that divide an interval across the boundary.
-    rounds: int = 9  # Number of times that such an interval is divided: 33^9 is beyond rounding.
+    rounds: int = 9  # Number of times that such an interval is divided: 33^-9 of it is less than rounding.
     farthest_return: float = 0.2  # Newton's method is tried from returns that are no farther than this.
     margin: float = 1.5  # Curves are given up to this distance from the middle of the window, in half widths.
 
@@ -45,11 +46,11 @@ Label = Callable[[np.ndarray], np.ndarray]  # states (n, 2) -> labels (n,)
 
 
 def basin_boundaries(found: Attractors, label: Label, labels: np.ndarray, along: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-    """The curves at which the basins of a grid meet, in a row, (n, 2), with nan between them.
+    """The curves at which the basins of a grid meet, one after the other, (n, 2), with nan between them.
 
     Under a constant load they are the separatrices of the saddle equilibria in the window of the grid. Under a periodic load they
-    are the stable manifolds of the saddle orbits, at most 4 and of up to 6 forcing periods, to which tracking of the edge leads.
-    They are given in part where they are too long: those of a chaotic saddle have no end.
+    are the stable manifolds of at most 4 saddle orbits, of up to 6 forcing periods, that edge tracking finds. Of a curve that is
+    too long only a part is given: the manifold of a chaotic saddle has no end.
 
     Parameters
     ----------
@@ -73,7 +74,7 @@ def basin_boundaries(found: Attractors, label: Label, labels: np.ndarray, along:
 
 
 def edges(label: Label, labels: np.ndarray, along: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of states (n, 2) with different labels, as close as rounding lets them be, at places spread over the boundary."""
+    """Pairs of states (n, 2) with different labels, as close to each other as rounding allows, spread over the boundary."""
     rows, columns = np.nonzero((labels[:, 1:] != labels[:, :-1]) & (labels[:, 1:] != UNDECIDED) & (labels[:, :-1] != UNDECIDED))
     chosen = np.unique(np.linspace(0, max(len(rows) - 1, 0), min(SETTINGS.edges, len(rows))).astype(int))
     rows, columns = rows[chosen], columns[chosen]
@@ -92,7 +93,7 @@ def edges(label: Label, labels: np.ndarray, along: np.ndarray, velocity: np.ndar
 
 
 def edge_saddles(system: System, low: np.ndarray, high: np.ndarray) -> list[PeriodicOrbit]:
-    """The saddle orbits near which motions from both sides of the boundary come; and their mirror images."""
+    """The saddle orbits near which motions on the boundary come, and their mirror images."""
     found: list[PeriodicOrbit] = []
     for track in section_states(system, 0.5 * (low + high), SETTINGS.tracked) if len(low) else ():
         for state, period in _returns(track):
@@ -106,7 +107,7 @@ def edge_saddles(system: System, low: np.ndarray, high: np.ndarray) -> list[Peri
 
 
 def _returns(track: np.ndarray) -> list[tuple[np.ndarray, int]]:
-    """The states of a motion nearest to which it comes back, and after how many periods, for each number of these."""
+    """For each period up to the longest, the state of a motion to which it returns most closely after this period, if near."""
     chosen = []
     for q in range(1, SETTINGS.max_period + 1):
         apart = np.abs(track[q:] - track[:-q]).max(axis=1)
@@ -118,7 +119,8 @@ def _returns(track: np.ndarray) -> list[tuple[np.ndarray, int]]:
 
 
 def clipped(curves: list[np.ndarray], window: Window) -> np.ndarray:
-    """The curves in a row, (n, 2), with nan between them and where they are outside the window by more than its half."""
+    """The curves one after the other, (n, 2), with nan between them and where they are more than 1.5 half widths from the middle
+    of the window."""
     parts = [np.full((0, 2), np.nan)]
     for curve in curves:
         far = ~(np.abs(window.scaled(curve)) <= SETTINGS.margin).all(axis=1)

@@ -1,6 +1,6 @@
-"""How basins interlace, measured on a grid of labels: basin entropy, uncertainty exponent, Wada property.
+"""Measures of a grid of labels for fractal basin boundaries: basin entropy, uncertainty exponent, Wada property.
 
-All of them see no finer than the grid: structure below a cell is not there for them.
+None of them sees structure that is finer than a cell of the grid.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class FractalSettings:
-    """What the measures of a boundary take a grid of labels to show."""
+    """The numbers by which a grid of labels is judged."""
 
-    radius: int = 5  # The cells within which a cell of a Wada boundary must meet all labels.
-    most_uncertain: float = 0.5  # A larger share of uncertain cells grows less than the boundary does: it meets itself.
-    agrees: float = 0.9  # From this share of the boundary cells on, basins agree with Wada.
-    fails: float = 0.5  # Up to this share of the boundary cells, basins do not agree with Wada.
+    radius: int = 5  # Within this number of cells, a cell of a Wada boundary must meet all labels.
+    most_uncertain: float = 0.5  # Larger shares of uncertain cells are not fitted: strips along the boundary overlap then.
+    agrees: float = 0.9  # Basins have the Wada property if at least this share of the boundary cells meets all labels.
+    fails: float = 0.5  # They do not have it if at most this share does.
 
 
 FRACTAL = FractalSettings()
@@ -68,7 +68,7 @@ class BasinEntropy:
 
     @property
     def fractal(self) -> bool:
-        """Whether S_bb > ln 2: then the boundary is fractal. A fractal one may stay below."""
+        """Whether S_bb > ln 2, which shows that the boundary is fractal; S_bb of a fractal boundary may also be smaller."""
         return self.boundary > math.log(2.0)
 
 
@@ -76,8 +76,8 @@ class BasinEntropy:
 def basin_entropy(labels: Numbers, box: int = 5) -> BasinEntropy:
     """The basin entropy of a grid of labels, in one or two dimensions, in boxes of `box` cells a side.
 
-    Incomplete boxes at the far edges, and boxes with an undecided cell (-1), are left out. The criterion S_bb > ln 2 holds for
-    boundaries that part two labels almost everywhere, in boxes of which few hold three.
+    Incomplete boxes at the far edges, and boxes with an undecided cell (-1), are left out. The criterion S_bb > ln 2 is for
+    boundaries that separate two labels almost everywhere, so that few boxes hold three.
 
     Parameters
     ----------
@@ -124,7 +124,8 @@ def _boxes(grid: np.ndarray, box: int) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class UncertaintyExponent(Result):
-    """f(eps) ~ eps^alpha, the share of states with a different end within eps (Grebogi et al., Phys. Lett. A 99 (1983) 415).
+    """The exponent alpha in f(eps) ~ eps^alpha, f the share of states with a different end within a distance eps of them
+    (Grebogi et al., Phys. Lett. A 99 (1983) 415).
 
     Attributes
     ----------
@@ -168,10 +169,10 @@ class UncertaintyExponent(Result):
 def uncertainty_exponent(labels: Numbers, distances: Iterable[int] | None = None) -> UncertaintyExponent:
     """The uncertainty exponent of a grid of labels, in one or two dimensions.
 
-    A cell is uncertain at eps if a cell with another label lies within eps cells of it, along each axis (undecided cells are not
-    counted, and make none uncertain). Cells nearer to the edge than the largest eps are not counted. The slope of ln f over
-    ln eps is fitted, with its standard error, over distances (1, 2, 3, 4, 6, 8, ... up to 1/16 of the grid) at which f is below
-    0.5, unless fewer than three are.
+    A cell is uncertain at eps if a cell with another label lies within eps cells of it along each axis; undecided cells do not
+    count. Cells nearer to the edge of the grid than the largest eps are left out. The slope of ln f over ln eps is fitted, with
+    its standard error, over the distances (1, 2, 3, 4, 6, 8, ... up to 1/16 of the grid) at which f is below 0.5, or over all if
+    fewer than three of them are.
 
     Parameters
     ----------
@@ -247,7 +248,7 @@ class WadaVerdict(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Wada(Result):
-    """How near to the boundary all basins are (after Daza et al., Sci. Rep. 5 (2015) 16579).
+    """The share of a boundary that lies near all basins (after Daza et al., Sci. Rep. 5 (2015) 16579).
 
     Attributes
     ----------
@@ -274,7 +275,7 @@ class Wada(Result):
 
     @property
     def verdict(self) -> WadaVerdict:
-        """By the share at the largest radius; of fewer than three basins that they are not."""
+        """The verdict by the share at the largest radius; fewer than three basins do not have the Wada property."""
         share = self.shares[-1] if len(self.shares) else 0.0
         if len(self.labels) < 3 or share <= FRACTAL.fails:
             return WadaVerdict.NOT_WADA
@@ -288,7 +289,7 @@ class Wada(Result):
 
     @property
     def resolution(self) -> str:
-        """What the test can see."""
+        """The resolution of the test, in a sentence."""
         return (
             f"a boundary cell meets all {len(self.labels)} basins if each has a cell within {int(self.radii[-1])} cells of it: "
             "basins that part there on a finer scale look like Wada ones, and threads finer than a cell are not seen"
@@ -297,18 +298,18 @@ class Wada(Result):
 
 @answered
 def wada(labels: Numbers, radius: int = FRACTAL.radius) -> Wada:
-    """Whether every point of the boundary of one basin is one of all basins, as far as a grid of labels shows it.
+    """Whether every point on the boundary of one basin is on the boundaries of all basins, as far as a grid of labels shows it.
 
-    Boundary cells have a neighbour, along an axis or diagonally, with another label. Around each a neighbourhood grows, up to
-    `radius` cells, until it meets all labels. In a Wada picture nearly all do; where basins meet in threes only at single points,
-    nearly none. Undecided cells (-1) are no label.
+    Boundary cells have a neighbour, along an axis or diagonally, with another label. Around each of them a neighbourhood grows,
+    up to `radius` cells, until it contains all labels. If the basins have the Wada property, nearly all neighbourhoods do in the
+    end; if three basins meet at single points only, nearly none does. Undecided cells (-1) count as no label.
 
     Parameters
     ----------
     labels
         Whole numbers, a label for each cell of a grid, (n,) or (rows, columns); -1 is undecided.
     radius
-        How far neighbourhoods grow, in cells.
+        The largest radius of the neighbourhoods, in cells.
 
     Raises
     ------
@@ -337,7 +338,7 @@ def wada(labels: Numbers, radius: int = FRACTAL.radius) -> Wada:
 
 
 def _labels(labels: Any) -> np.ndarray:
-    """Whole numbers over one or two dimensions; a DataArray's values."""
+    """The labels as an array of whole numbers, of one or two dimensions."""
     try:
         array = np.asarray(labels)
         grid = array.astype(int)

@@ -42,12 +42,12 @@ if TYPE_CHECKING:
 class BasinSettings:
     """The numbers of a picture of basins."""
 
-    cells: int = 201  # Number of cells along an axis for which no numbers are given.
+    cells: int = 201  # Number of cells along an axis whose values are not given.
     narrowest: float = 1e-6  # The half width of the window around a grid of one point.
     periods: int = 500  # The largest number of forcing periods for which a motion is followed.
     within: float = 1e-2  # The distance from an attractor within which a motion has reached it.
-    rows: int = 25  # Number of velocities in a chunk of a store, which then takes seconds.
-    # Number of states from which new attractors are looked for, out of the cells whose motions end on no known one.
+    rows: int = 25  # Number of rows of the grid in a chunk of a store, which then takes seconds.
+    # Number of states, out of the cells whose motions end on no known attractor, from which new attractors are looked for.
     new_states: int = 64
     rounds: int = 3  # Number of times that new attractors are looked for.
 
@@ -109,10 +109,11 @@ def basins_of_attraction(
 ) -> xarray.Dataset:
     """The attractor on which the motion from each state (coordinate, velocity) of a grid at phase 0 ends, and the time it takes.
 
-    A cell has the label of an attractor if its motion is proved to be captured at rest, settles on the cycle (to 1e-6, or is as
-    near for two rounds, and nearer in the second), or ends among the points of a chaotic set; else it is -1, undecided. Cells
-    that settle elsewhere give new attractors, with labels after the known ones. The time is that after which the motion stays
-    within a distance of the attractor's points at phase 0, in forcing periods; to rest, at most that to the proof of capture.
+    A cell has the label of an attractor if its motion is proved to be captured at rest, settles on the orbit (to 1e-6, or stays
+    as near for two of its periods and is nearer in the second), or ends among the points of a chaotic set; else it is -1,
+    undecided. Motions that settle elsewhere give new attractors, with labels after the known ones. The time is the number of
+    forcing periods after which the motion stays within a distance (`within`) of the attractor's states at phase 0; for rest it is
+    at most the time until capture is proved.
 
     Parameters
     ----------
@@ -123,30 +124,31 @@ def basins_of_attraction(
     found
         The attractors and their labels; by default those that `find_attractors` finds, over the grid.
     periods
-        The most forcing periods of each motion.
+        The largest number of forcing periods of each motion.
     within
-        That distance, the largest of all coordinates and velocities.
+        The distance from an attractor, as the largest difference of a variable, within which a motion has reached it.
     curves
-        Adds the curves at which basins meet, computed by the backward flow (see `basin_boundaries`), as `boundary_...`
+        Whether to add the curves at which basins meet, computed by the backward flow (see `basin_boundaries`), as `boundary_...`
         over `boundary_point`, nan between curves.
     tol
         The error of a step.
     rows
-        Of the grid, in one chunk of a store, or of what a worker computes.
+        The number of rows of the grid in one chunk of a store or of a worker.
     store, workers, scheduler
-        Where the cells are kept and who computes them, see `saltus.sweep.run`; the attractors are
-        found first, and the curves at the end, at every run. Where none is given all cells are computed at once.
+        Where the cells are kept and who computes them, see `saltus.sweep.run`. The attractors before and the curves after the
+        cells are computed anew at every run. If none is given all cells are computed at once.
     progress
         Called with the fraction done and what is being done.
     coordinates
-        The coordinates of the grid, by the model's name: theta=np.linspace(-2, 2, 201). With several coordinates two
-        state variables are lists, such as theta_1 and theta_1_velocity; the others are held fixed, closed or 0 if not given.
+        The coordinates of the grid, by the model's name: theta=np.linspace(-2, 2, 201). With several coordinates two state
+        variables are lists, such as theta_1 and theta_1_velocity; the others are held fixed, by default at rest at their
+        contacts, or at 0 without one.
 
     Returns
     -------
     xarray.Dataset
-        A Dataset over (velocity, coordinate), or the variables of the plane: `label`, `time` (nan where undecided), and the table
-        of the attractors, in which `cells` is the share of the grid.
+        A Dataset over (velocity, coordinate), or over the two variables of the plane: `label`, `time` (nan where undecided), and
+        the table of the attractors, in which `cells` is an attractor's share of the grid.
 
     Raises
     ------
@@ -191,7 +193,7 @@ def _with_new(found: Attractors, labelling: Labelling, grid: Grid, label: np.nda
         reasons = list(dict.fromkeys([*reasons, *more.reasons]))
         if not new:
             continue
-        fresh = _relabelled(new, 1 + max([member.label for member in members], default=REST))
+        fresh = _relabelled(new, [member.label for member in members])
         members += fresh
         further = replace(labelling, targets=tuple(member.target for member in fresh))
         label[rows, columns], time[rows, columns] = further.of(states)
@@ -210,7 +212,7 @@ def _curves(found: Attractors, labelling: Labelling, grid: Grid, label: np.ndarr
 
 
 def _check_curves(system: System, grid: Grid) -> None:
-    """Refuse, before cells are computed, what has no curves: a grid that is a line, impacts that cannot be undone."""
+    """Refuse, before cells are computed, grids and systems without curves: a grid that is a line, irreversible impacts."""
     check_system(system, "the curves between basins", coordinates=1)
     for name, values in zip(grid.plane, (grid.horizontal, grid.vertical), strict=True):
         if len(values) < 2:
@@ -228,16 +230,20 @@ def _same(one: Target, other: Target) -> bool:
     return bool(apart.max() < 10.0 * SAME_STATE * (1.0 + np.abs(one.states).max()))
 
 
-def _relabelled(new: list[Attractor], first: int) -> list[Attractor]:
-    """New attractors with labels after the known ones, rest with its own; shares of the few states say nothing."""
+def _relabelled(new: list[Attractor], known: list[int]) -> list[Attractor]:
+    """New attractors with labels after the known ones, without shares, as these would be of a few states only.
+
+    A state of rest gets the label of rest if no known one has it: models with several contacts may have several states of rest.
+    """
+    first = 1 + max(known, default=REST)
     label_of = {member.label: first + i for i, member in enumerate(new)}
-    if first == REST + 1:  # nothing is known that rests
-        label_of |= {member.label: REST for member in new if member.label == REST}
+    if REST in label_of and REST not in known:
+        label_of[REST] = REST
     return [member.labelled(label_of, starts=0, of=0) for member in new]
 
 
 def _around(system: System, grid: Grid) -> Window:
-    """The least window around the contact that holds a grid; of variables that are held fixed the default one."""
+    """The smallest window around the contact that contains a grid; with the default bounds for variables that are held fixed."""
     area = check_window(None, system)
     bounds, names = [list(pair) for pair in area], list(grid.fixed)
     for name, values in zip(grid.plane, (grid.horizontal, grid.vertical), strict=True):
@@ -276,7 +282,7 @@ def _grid(system: System, velocity: Any, coordinates: Mapping[str, Any], found: 
 
 
 def _over(system: System, window: Window, place: int) -> np.ndarray:
-    """Evenly spaced values of a state variable over a window, where the contact lets the system be."""
+    """Evenly spaced values of a state variable over a window, without those beyond a contact."""
     values = window.centre[place] + window.half[place] * np.linspace(-1.0, 1.0, SETTINGS.cells)
     model = system.model
     if model.sides and place == 0:

@@ -1,4 +1,4 @@
-"""Which attractor motions end on, state by state, and how long they take to come near: what basins are made of."""
+"""The attractors on which the motions from given states end, and the times after which they stay near these."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ class LabellingSettings:
 
     # Number of forcing periods of the first stage; after each stage settled motions are labelled. Later stages are longer.
     stage: int = 48
-    last: int = 64  # Number of last states of a motion that does not settle, which must lie on a sampled set in the median.
-    # The largest number of stroboscopic states that are kept at once: 67 MB, and as much again for what is computed from them.
+    last: int = 64  # A motion that does not settle is on a sampled set if the median distance of so many last states is small.
+    # The largest number of stroboscopic states that are kept at once: 67 MB, and as much again for arrays computed from them.
     most_states: int = 1 << 22
     fewest: int = 256  # The least number of motions that are followed together.
 
@@ -42,7 +42,7 @@ class Labelling:
     def of(self, states: np.ndarray, progress: Progress = silent) -> tuple[np.ndarray, np.ndarray]:
         """The labels of states (n, d), UNDECIDED where no label is certain, and the times to reach the attractors, (n,) each.
 
-        States at a contact that move into it are those just before the impact.
+        A state at a contact that moves into it is taken just before the impact.
         """
         states = before_impacts(self.system, states)
         label, time = np.empty(len(states), dtype=np.int16), np.empty(len(states))
@@ -54,7 +54,7 @@ class Labelling:
         return label, time
 
     def _together(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Labels and times of as many states as fit into memory, in stages: settled motions are not followed further."""
+        """Labels and times of states that fit into memory together, in stages: settled motions are not followed further."""
         label, time = np.full(len(states), UNDECIDED, dtype=np.int16), np.full(len(states), np.nan)
         rows, history, done = np.arange(len(states)), states[:, None], 0
         while rows.size and done < self.periods:
@@ -68,7 +68,7 @@ class Labelling:
         return label, time
 
     def _labels(self, ends: Recurrence, at_the_end: bool) -> np.ndarray:
-        """The labels of motions; at the end those that do not settle may lie on a set that is known by a sample."""
+        """The labels of motions; unsettled motions are compared with the sampled sets at the end only."""
         label = np.full(len(ends), UNDECIDED, dtype=np.int16)
         for target in self.targets:
             if target.kind is AttractorKind.REST:
@@ -83,14 +83,14 @@ class Labelling:
         return label
 
     def _rests(self, target: Target, ends: Recurrence) -> np.ndarray:
-        """Which motions are at rest for good in the state of an attractor; one contact leaves no choice, (n,)."""
+        """Which motions are at rest for good in the state of an attractor, (n,); a model with one contact has one such state."""
         here = target.distance(ends.last) < SAME_STATE * max(1.0, float(np.abs(target.states).max()))
         return np.asarray(here & (ends.rest | (ends.period == 1)) if self.system.model.held else ends.rest)
 
     def _times(self, label: np.ndarray, ends: Recurrence) -> np.ndarray:
-        """Forcing periods after which each motion stays near its attractor, up to its end; nan where undecided.
+        """The forcing periods after which each motion stays near its attractor for as long as it is followed; nan if undecided.
 
-        The states begin with the initial one; nan stands for periods that were not needed.
+        `ends.states` begins with the initial states; it has nan for periods that a motion did not need.
         """
         time = np.full(len(label), np.nan)
         for target in self.targets:
@@ -107,7 +107,7 @@ class Labelling:
 
 
 def _on_orbit(target: Target, ends: Recurrence) -> np.ndarray:
-    """Which motions have settled on an orbit, or were near it for two rounds, and nearer in the second, (n,)."""
+    """Which motions have settled on an orbit, or were near it during its last two periods and nearer in the second, (n,)."""
     last, q = ends.states[:, -1], len(target.states)
     near = SAME_STATE * np.maximum(1.0, np.abs(last).max(axis=1))
     here: np.ndarray = (target.distance(last) < near) & (ends.periodic | ends.unsettled)

@@ -1,7 +1,7 @@
 """Lyapunov exponents, through the saltation of every impact.
 
-`spectrum` has all exponents of one motion, `ensemble` both of many motions at once (by `tangent_frames`), `largest_exponent` only
-the largest one, from `perturbations` by derivatives (`stretching`) or pairs of motions (`neighbours`). They share
-`renormalisation`, how a run is cut and begun, and `averages`, the mean of a run. `two_trajectory` and `area_contraction` are
-independent checks.
+`spectrum` computes all exponents of one motion, `ensemble` both exponents of many motions with one coordinate at once (by
+`tangent_frames`), `largest_exponent` the largest one only, from `perturbations` by derivatives (`stretching`) or by pairs of
+motions (`neighbours`). They share `renormalisation` (how a run is begun and cut into spans) and `averages` (the mean over a run).
+`two_trajectory` and `area_contraction` are independent checks.
 """

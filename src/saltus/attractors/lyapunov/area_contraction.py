@@ -1,4 +1,4 @@
-"""How fast a motion contracts areas of states, from its impacts and the time spent on each side: the law of the determinant."""
+"""How fast a motion contracts areas of states: the determinant of the flow, from its impacts and the time spent on each side."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Contraction:
 
     ln det Phi = sum over impacts of ln(R_v v+ / v-) + sum over sides s of (da/dv)_s T_s, where R(v-) is the law of impact and T_s
     the time on the side; for the metainterface (da/dv)_s = -C c^P / (1 + m)^P, and R_v v+ / v- = e^2 (numerics.md, section 5).
-    Nothing of it is taken from the derivatives that are carried along the motion.
+    It is independent of the derivatives that are carried along the motion.
     """
 
     def __init__(self, system: System) -> None:
@@ -41,7 +41,7 @@ class Contraction:
         self._rates = {s: _middle(enclose([d], self._leaves)[0]) for s, d in damping.items()} if self.known else {}
 
     def along(self, motion: Motion) -> float:
-        """ln det from the start of a motion to its end; -inf if it rests between them, NaN where the law is not so simple."""
+        """ln det from the start of a motion to its end; -inf if it rests in between, NaN if da/dv is not constant on a side."""
         if not self.known:
             return float("nan")
         if len(motion.events.of(EventKind.REST)):
@@ -66,9 +66,11 @@ class Contraction:
 
 
 def impact_factor(system: System, parameters: Mapping[str, np.ndarray]) -> np.ndarray:
-    """The product over the sides of abs(dv+/dv-) of impacts without speed, for arrays of parameters: below 1 rest is reached.
+    """The product over the sides of abs(dv+/dv-) of impacts without speed, for arrays of parameters: if it is below 1, impacts
+    lead to rest.
 
-    () or the shape of the arrays; NaN where the law has no slope there, and 0 where contacts or frictions hold a coordinate.
+    Its shape is () or that of the arrays; it is NaN if the impact law has no slope there, and 0 if contacts or frictions hold a
+    coordinate.
     """
     traced = trace(system)
     if traced.velocity_after is None:
@@ -82,6 +84,6 @@ def impact_factor(system: System, parameters: Mapping[str, np.ndarray]) -> np.nd
 
 
 def _middle(bounds: Interval) -> np.ndarray:
-    """What an expression of numbers without width is: its bounds differ by rounding."""
+    """The value of an expression of exact numbers, whose bounds differ by rounding only."""
     middle: np.ndarray = 0.5 * (bounds.lo + bounds.hi)
     return middle

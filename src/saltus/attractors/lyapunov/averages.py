@@ -1,4 +1,4 @@
-"""Averages along a motion: what a long run says of the mean of a correlated series, and how well."""
+"""Averages along a motion: the mean of a correlated series from a long run, and its error."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ def weights(count: int) -> np.ndarray:
     """(count,): exp(-1 / (u (1 - u))) at the middles u of equal shares of the run, scaled to the sum 1.
 
     With these weights the average of a periodic or quasi-periodic series converges faster than any power of the length (Das,
-    Saiki, Sander and Yorke, Nonlinearity 30 (2017) 4111), where the plain mean has an error of 1 / length; and what a run has
-    kept of its beginning counts nothing. The price, in chaos, is a standard error that is larger by a quarter.
+    Saiki, Sander and Yorke, Nonlinearity 30 (2017) 4111), while the plain mean has an error of 1 / length; and the beginning of
+    the run, which may still depend on the start, has no weight. In chaos the standard error is larger by a quarter.
     """
     u = (np.arange(count) + 0.5) / count
     bump = np.exp(4.0 - 1.0 / (u * (1.0 - u)))
@@ -35,11 +35,11 @@ def average(series: np.ndarray) -> np.ndarray:
 def uncertainty(series: np.ndarray) -> np.ndarray:
     """Half the width of the 95 % interval of `average`, (periods, ...) -> (...); 0 where an entry is -inf.
 
-    Entries of a series follow from those before, so that their scatter says little. The means of batches of 1, 2, 4, ... entries
-    are ever less correlated, and where entries follow their like the standard error from them grows until the batches outlast
-    the correlation. The largest of those from 16 to 127 batches is taken, times the factor of Student's t for as few. It is
-    honest as long as the correlation dies out within a sixteenth of the run; for regular motion, whose averages converge faster
-    than their scatter shows, it is far too large.
+    The entries of the series are correlated, so that their scatter alone gives no error. The means of batches of 1, 2, 4, ...
+    entries are less and less correlated; with a positive correlation the standard error from them grows with the batches, until
+    these are longer than the correlation lasts. The largest standard error from 16 to 127 batches is taken, times the factor of
+    Student's t for 16. It is right as long as the correlation decays within a sixteenth of the run; for regular motion, whose
+    averages converge faster than their scatter shows, it is far too large.
 
     Raises
     ------
@@ -72,16 +72,14 @@ class Estimate:
         return cls(average(rates), uncertainty(rates), np.stack(averages), np.stack(errors))
 
     def positive(self, duration: Any) -> np.ndarray:
-        """Whether rates of growth over runs of these durations are above 0 by more than their error and the resolution.
-
-        They must be so in all and in both halves of the run.
-        """
+        """Whether rates of growth over runs of these durations are above 0 by more than their error and the resolution, over the
+        whole run and over both of its halves."""
         above = self.value - self.error > resolution(duration)
         return np.asarray(above & (self.halves - self.half_errors > resolution(np.asarray(duration) / 2)).all(axis=0))
 
 
 def resolution(duration: Any) -> Any:
-    """2 ln(t) / t: the largest rate over a run of this duration that growth by the square of the time has."""
+    """2 ln(t) / t: the mean rate of growth over a run of duration t of a perturbation that grows as the square of the time."""
     return np.vectorize(lambda t: 2.0 * math.log(max(t, math.e)) / t, otypes=[float])(duration)
 
 

@@ -1,4 +1,4 @@
-"""Lyapunov exponents of many motions at once, in lanes: charts of them along a parameter."""
+"""Lyapunov exponents of many motions at once, in lanes, as for charts of exponents along a parameter."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from saltus.systems import System
 if TYPE_CHECKING:
     import xarray
 
-ENDINGS = ("moving", "rest", "lost")  # what the flags of `ending` mean
+ENDINGS = ("moving", "rest", "lost")  # the meanings of the flags of `ending`
 
 
 def lyapunov_many(
@@ -37,10 +37,10 @@ def lyapunov_many(
     progress: Progress = silent,
     **coordinates: Any,
 ) -> xarray.Dataset:
-    """Both exponents of every motion of an ensemble, as `lyapunov_spectrum` has them of one.
+    """Both exponents of every motion of an ensemble, as `lyapunov_spectrum` computes them for one motion.
 
-    Arrays broadcast as those of `simulate_many` do. Motions that settle on an orbit are followed along it; those that rest at the
-    contact for good have no exponents if impacts lose nothing, and -inf if they do.
+    Arrays broadcast as those of `simulate_many` do. Motions that settle on an orbit are followed along it. For motions that rest
+    at the contact for good the exponents are -inf if impacts lose energy, and nan if they do not.
 
     Parameters
     ----------
@@ -61,9 +61,9 @@ def lyapunov_many(
     -------
     xarray.Dataset
         A Dataset over the dimensions of the arguments: `exponent` and its `error`, `at_half` and `later_half` (from the halves of
-        the run), each with a dimension `index` of 2; `resolution`, below which an exponent may be 0; `positive`,
-        whether the largest is above both, in all and in both halves; `period`, the forcing periods after which the motion repeats
-        itself at the end, 0 if it does not, `ending`, and the state at the end.
+        the run), each with a dimension `index` of 2; `resolution`, below which an exponent may be 0; `positive`, whether the
+        largest exponent is above its error and the resolution, over the whole run and over both halves; `period`, the forcing
+        periods after which the motion repeats itself at the end, 0 if it does not; `ending`, and the state at the end.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def lyapunov_many(
 
 
 class _Many:
-    """The motions, flat: their parameters and the lengths of their periods."""
+    """The motions in one row: their parameters and the lengths of their periods."""
 
     def __init__(self, system: System, inputs: Inputs, tol: float) -> None:
         self.system, self.inputs, self.tol = system, inputs, tol
@@ -107,7 +107,7 @@ class _Many:
         return np.stack([np.broadcast_to(values, self.inputs.size) for values in state], axis=1).astype(float)
 
     def settle(self, states: np.ndarray, periods: int) -> tuple[np.ndarray, np.ndarray]:
-        """States after so many periods, or fewer where they have settled, and which are proved to rest for ever."""
+        """States after so many periods, or fewer for motions that have settled, and which motions are proved to rest for ever."""
         if not periods or not len(states):
             return states.copy(), np.zeros(len(states), dtype=bool)
         result = self._follow(states, periods, ("rest", "settled"))
@@ -116,7 +116,8 @@ class _Many:
         return np.where(going[:, None], last_states(self.system, result), np.nan), stop == Stop.CAPTURED
 
     def period(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Forcing periods after which motions from here repeat themselves, 0 where they do not, or are lost; and which stand."""
+        """Forcing periods after which motions from these states repeat themselves, 0 if they do not or are lost; and which
+        motions stand still."""
         found, still = np.zeros(len(states), dtype=int), np.zeros(len(states), dtype=bool)
         here = np.flatnonzero(np.isfinite(states).all(axis=1))
         if here.size and self.system.load.frequency is not None:
@@ -152,7 +153,7 @@ def _measures(system: System, run: _Many, stretched: Stretched, captured: np.nda
         lossy = impact_factor(system, run.parameters) < LYAPUNOV.lossless
         growth = np.where((captured & lossy)[None, :, None], -np.inf, growth)
     found, duration = Estimate.of(growth / run.lengths[None, :, None]), len(growth) * run.lengths
-    # Contacts and frictions that hold a coordinate for a while take away derivatives of motions that go on.
+    # Contacts and frictions that hold a coordinate for a while make an exponent -inf also where the motion goes on.
     rested = captured | (still if system.model.held else np.isneginf(found.value[:, 1]))
     moving = np.isfinite(stretched.states).all(axis=1)
     return {

@@ -1,4 +1,4 @@
-"""The largest Lyapunov exponent of many motions at once, as samples of their attractors: what searching for chaos takes."""
+"""The largest Lyapunov exponents of groups of motions, each a sample of an attractor, as the search for chaos needs them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from saltus.attractors.lyapunov.neighbours import Neighbours
 from saltus.attractors.lyapunov.stretching import Stretching
 from saltus.systems import System
 
-FEWEST = 4  # motions of which a scatter is taken
+FEWEST = 4  # the fewest motions from whose scatter an error is taken
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,23 +27,23 @@ class Largest:
 
     @classmethod
     def unknown(cls, groups: int) -> Largest:
-        """Of so many groups nothing."""
+        """The entries of so many groups of which nothing is known yet."""
         return cls(*np.full((2, groups), np.nan), *np.zeros((2, groups), dtype=bool))
 
     def put(self, rows: np.ndarray, other: Largest) -> None:
-        """Put what is now known of these groups in its place."""
+        """Replace the entries of these groups."""
         for name in ("exponent", "error", "positive", "negative"):
             getattr(self, name)[rows] = getattr(other, name)
 
 
 class LargestExponents:
-    """The largest exponent of each group of motions, from a run that is made longer where its sign is open.
+    """The largest exponent of each group of motions, from a run that can be made longer while the sign is open.
 
-    The motions of a group are taken for independent samples of one attractor, so that their scatter gives the error, by Student's
-    t. Motions that are lost are left out, and so are those whose perturbations surely shrink where others surely grow.
-    Growth is that of `simulate_many`'s derivatives (`Stretching`), with several contacts of pairs of motions (`Neighbours`).
+    The motions of a group are taken as independent samples of one attractor, so that their scatter gives the error, by Student's
+    t. Motions that are lost are left out, and so are motions whose perturbations surely shrink if those of others surely grow.
+    The growth is that of derivatives (`Stretching`) or, with several contacts, of the distance of two motions (`Neighbours`).
 
-    The resolution is 2 ln(t) / t for the time t of one motion, as regular ones may part like t^2.
+    The resolution is 2 ln(t) / t for the time t of one motion, as the distance of regular motions may grow like t^2.
 
     Parameters
     ----------
@@ -54,7 +54,8 @@ class LargestExponents:
     parameters
         Numbers by dotted path, (groups,) each, in place of the system's.
     shortest
-        The forcing periods of the shortest run, before which perturbations turn for a quarter of it.
+        The forcing periods of the shortest run. Before it, perturbations are followed for a quarter of this time, to turn to the
+        direction that grows.
     tol
         The error of a step.
     """
@@ -72,7 +73,7 @@ class LargestExponents:
 
 
 def _averaged(rates: np.ndarray, duration: np.ndarray) -> Largest:
-    """The averages of rates (groups, size) over these times, (groups,); those below the resolution count as 0."""
+    """The averages of rates (groups, size) over these times, (groups,); averages within the resolution are of neither sign."""
     least = resolution(duration)
     surely = np.abs(rates) > least[:, None]
     grows, shrinks = surely & (rates > 0.0), surely & (rates < 0.0)

@@ -1,7 +1,7 @@
 """The largest exponents of many motions from pairs of neighbours, in lanes, for models with several contacts.
 
-A derivative of such a motion to its start is moved through every event by the scalar kernel, with a column for each variable of
-the state, while two motions go on in lanes, also through impacts that die away.
+The derivative of such a motion by its start must be carried through every event by the scalar kernel, with a column for each
+state variable; two motions are followed in lanes, also through accumulations of impacts, which is faster.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from saltus.orbits import states_beside
 class NeighbourSettings:
     """How pairs are followed before they are brought together again."""
 
-    # The longest time between two renormalisations, in units of time, if a forcing period is not longer: neighbours whose
-    # exponent is 0.3 part by a factor of 2000 in it, and are still 2e-4 from one another.
+    # The longest time between two renormalisations, in units of time, but at least a forcing period: with an exponent of 0.3 the
+    # distance of neighbours grows by a factor of 2000 in it, to 2e-4.
     longest_span: float = 26.0
-    most_periods: int = 16  # The largest number of forcing periods between two of them.
-    # The factor by which a pair may come together and still say by how much: its distance is then 100 times the error of a step.
-    # What shrinks more is measured by derivatives.
+    most_periods: int = 16  # The largest number of forcing periods between two renormalisations.
+    # The smallest factor of the distance of a pair that is measured by the pair: the distance is then 100 times the error of a
+    # step. Smaller factors are measured by derivatives.
     least: float = 1e-4
 
 
@@ -34,10 +34,10 @@ SETTINGS = NeighbourSettings()
 
 
 class Neighbours(Perturbations):
-    """Pairs of motions, whose distance is brought back to 1e-7 again and again."""
+    """Pairs of motions, whose distance is reset to 1e-7 after each span."""
 
     def longest_spans(self, rows: np.ndarray) -> np.ndarray:
-        """As long as neighbours stay near, however chaotic they are."""
+        """The number of forcing periods within which neighbours stay near, even if they are chaotic."""
         return np.asarray(np.clip(SETTINGS.longest_span / self.lengths[rows], 1, SETTINGS.most_periods).astype(int))
 
     def step(self, motions: np.ndarray, periods: int) -> None:

@@ -1,4 +1,4 @@
-"""How small perturbations of many motions grow in a run that can be made longer."""
+"""The growth of small perturbations of many motions, over a run that can be made longer."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from saltus.systems import System
 
 
 class Perturbations(ABC):
-    """A perturbation of each motion, along the direction that grows most once it has turned there.
+    """A perturbation of each motion, which has turned to the direction of the largest growth before its growth is measured.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class Perturbations(ABC):
         return self.growth.reshape(-1, self.size)[rows] / time[:, None], time
 
     def _go_on(self, rows: np.ndarray, periods: int) -> None:
-        """Follow these groups until so many periods are done; what one does depends on no other one."""
+        """Follow these groups until so many periods are done; none depends on the others."""
         while (rows := rows[self.periods[rows] < periods]).size:
             spans = np.minimum(self.longest_spans(rows), periods - self.periods[rows])
             for span in np.unique(spans).tolist():
@@ -64,4 +64,4 @@ class Perturbations(ABC):
 
     @abstractmethod
     def step(self, motions: np.ndarray, periods: int) -> None:
-        """Follow motions of these numbers for so many periods: where they and their perturbations are then, and the growth."""
+        """Follow the motions of these indices for so many periods: update their states, the perturbations and the growth."""

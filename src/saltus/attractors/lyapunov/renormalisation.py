@@ -1,7 +1,7 @@
-"""Renormalisation: how a long run of derivatives is cut into spans, after each of which they are made orthonormal again.
+"""Renormalisation: a long run of derivatives is cut into spans, and after each span the derivatives are made orthonormal again.
 
-All methods of this room share it: which systems and lengths can have a run, into how many spans a forcing period is cut, and the
-frame of derivatives with which it begins.
+All methods of this room share the checks of the arguments, the number of spans in a forcing period, and the frame of derivatives
+with which a run begins.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from saltus.systems import System, check_system
 
 
 def check_run(function: str, system: Any, periods: Any, transient: Any, tol: float) -> None:
-    """Refuse what has no exponents, and a run too short for error bars of its halves.
+    """Refuse systems that have no exponents, and runs too short for error bars of their halves.
 
     Raises
     ------
     ParameterError
-        With the name of the argument.
+        The error has the name of the argument.
     """
     check_system(system, function, several_contacts=True)
     check_periodic(system)
@@ -34,7 +34,7 @@ def check_run(function: str, system: Any, periods: Any, transient: Any, tol: flo
 
 
 def period_length(system: System) -> float:
-    """The forcing period; 1 under constant loads, where a unit of time stands for it."""
+    """The forcing period; under constant loads 1, a unit of time, is taken instead."""
     return system.load.period or 1.0
 
 
@@ -44,9 +44,9 @@ def span_count(length: float) -> int:
 
 
 def first_frame(size: int) -> np.ndarray:
-    """An orthonormal frame to begin with, (size, size), that no symmetry of a system fits.
+    """An orthonormal frame to begin with, (size, size), of random directions.
 
-    One along the coordinates may lie in an invariant plane, and would then stay there until rounding moves it out.
+    A frame along the coordinates may lie in an invariant plane of a system, and would stay in it until rounding moves it out.
     """
     frame: np.ndarray = np.linalg.qr(np.random.default_rng(0).standard_normal((size, size)))[0]
     return frame

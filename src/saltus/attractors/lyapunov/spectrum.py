@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 class Exponents(Result):
     """The exponents of a motion, per unit of dimensionless time, largest first.
 
-    They are -inf where the motion comes to rest with a loss at impacts: states beside it are at the same rest after a finite
-    time. They are NaN where the motion has no derivative or ends; `note` then says why.
+    They are -inf if the motion comes to rest with a loss at impacts: motions beside it reach the same rest in a finite time. They
+    are NaN if the motion has no derivative or ends; `note` then says why.
 
     Attributes
     ----------
@@ -39,13 +39,13 @@ class Exponents(Result):
     halves
         (2, 2 n): the same exponents from the first and from the second half of the run.
     half_errors
-        (2, 2 n): their errors.
+        (2, 2 n): half widths of 95 % intervals of the exponents from the halves.
     divergence
-        The mean of ln det per unit of time, from impacts and the time on each side; NaN where not so simple.
+        The mean of ln det per unit of time, from impacts and the time on each side; NaN if it does not follow from these alone.
     stroboscopic
         The stroboscopic map's largest exponent over the forcing period, from two trajectories; or NaN.
     stroboscopic_error
-        Its half width of a 95 % interval.
+        The half width of its 95 % interval.
     periods
         The forcing periods (units of time under constant loads) that were averaged over.
     duration
@@ -84,7 +84,7 @@ class Exponents(Result):
 
     @property
     def sum_defect(self) -> float:
-        """By how much the exponents miss the mean divergence, which they must add up to."""
+        """The difference between the sum of the exponents and the mean divergence, which should be equal."""
         return abs(float(self.values.sum()) - self.divergence) if np.isfinite(self.values).all() else math.nan
 
     @property
@@ -95,12 +95,12 @@ class Exponents(Result):
 
     @property
     def resolution(self) -> float:
-        """2 ln(t) / t after a time t: a regular motion, which may grow by t^2, may have an exponent below it."""
+        """2 ln(t) / t after a time t: regular motion, whose perturbations may grow like t^2, may show an exponent up to this."""
         return float(resolution(self.duration))
 
     @property
     def positive(self) -> bool:
-        """Whether the largest exponent is above 0 by more than its error and the resolution, in all and in both halves."""
+        """Whether the largest exponent is above 0 by more than its error and the resolution, over the run and both halves."""
         largest = Estimate(self.values[0], self.errors[0], self.halves[:, 0], self.half_errors[:, 0])
         return bool(largest.positive(self.duration))
 
@@ -141,28 +141,29 @@ def lyapunov_spectrum(
     """All Lyapunov exponents of a motion, lambda_i = lim ln(R_ii) / t, where Phi = Q R over the time t.
 
     The derivatives Phi of the exact flow, with the saltation of every impact, are carried over spans of a forcing period, each
-    no longer than 6.5 units of time, and made orthogonal after each. Averages over the periods are weighted
+    no longer than 6.5 units of time, and made orthonormal after each span. Averages over the periods are weighted
     (`averages.weights`), so that exponents of periodic and quasi-periodic motions, and of equilibria, converge faster than any
-    power of the time. They are -inf in the directions that closed contacts and sticking frictions take away.
+    power of the time. Exponents are -inf for the directions in which closed contacts and sticking frictions hold the motion.
 
-    Two checks come along. The exponents must add up to the mean divergence, which is computed from the impacts and from the
-    times on each side; with several contacts or frictions it is not known. And the stroboscopic map must have the same largest
-    exponent, from a second trajectory that starts 1e-7 beside the motion and is moved back to that distance after every period.
+    The result contains two checks. The sum of the exponents must equal the mean divergence, which is computed from the impacts
+    and from the times on each side; with several contacts or frictions it is not known. And the stroboscopic map must have the
+    same largest exponent, computed from a second trajectory that starts at a distance of 1e-7 from the motion and is moved back
+    to this distance after every period.
 
     Parameters
     ----------
     system
-        What moves, under constant or harmonic loads. Under constant ones a unit of time stands for the period.
+        What moves, under constant or harmonic loads. Under constant loads a unit of time is taken as the period.
     velocity, coordinates
         The state at the start, at phase 0.
     periods
-        Over how many forcing periods to average, at least 32.
+        The number of forcing periods over which to average, at least 32.
     transient
-        How many to let pass first.
+        The number of forcing periods before these.
     tol
         The error that one step may make.
     two_trajectories
-        False leaves out the stroboscopic map's exponent, and a half of the work.
+        Whether to compute the stroboscopic map's exponent, which takes about half of the work.
     progress
         Called with the fraction done and what is being done.
 
@@ -193,7 +194,7 @@ def lyapunov_spectrum(
 
 
 class _Run:
-    """What is gathered on the way: the logarithms of the stretch and of the determinant of every period."""
+    """A run: the logarithms of the stretches and of the determinant of every period."""
 
     def __init__(self, system: System, periods: int) -> None:
         self.system, self.length = system, period_length(system)
@@ -231,7 +232,7 @@ class _Run:
         frame, upper = np.linalg.qr(found.state @ frame)
         with np.errstate(divide="ignore"):
             lengths = np.abs(np.diag(upper))
-            if self.system.model.held:  # what closed contacts and sticking frictions take away is 0 but for rounding
+            if self.system.model.held:  # lengths in directions held by contacts and frictions are 0, up to rounding
                 lengths[lengths < LYAPUNOV.rounding * lengths.max()] = 0.0
             self.stretch[p] += np.log(lengths)
         self.areas[p] += contraction.along(found.motion)
@@ -259,7 +260,7 @@ class _Run:
 
 
 def _lost(motion: Motion) -> str | None:
-    """Why a motion has no exponents, or none that are finite."""
+    """Why a motion has no finite exponents; None if it has."""
     if motion.stop is Stop.LIMIT:
         return f"the motion ends at time {motion.time:.6g}, where its margin {motion.limit} reaches 0"
     if not motion.phase_known:

@@ -1,4 +1,4 @@
-"""How much small perturbations of many motions grow, by the derivatives of their ends to their starts."""
+"""The growth of small perturbations of many motions, by the derivatives of their ends by their starts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from saltus.systems import System
 
 
 class Stretching(Perturbations):
-    """Perturbations by derivatives, which along the direction that grows are accurate however far a step goes."""
+    """Perturbations by derivatives, which are accurate along the growing direction however long a step is."""
 
     def longest_spans(self, rows: np.ndarray) -> np.ndarray:
         """A step may be as long as the run."""
@@ -31,7 +31,7 @@ def stretched(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """States, directions and ln of the growth of small perturbations after so many periods; nan where a motion is lost.
 
-    A perturbation of which closed contacts and sticking frictions leave nothing has shrunk by as much as a number can.
+    If closed contacts and sticking frictions reduce a perturbation to 0, its factor is taken as the smallest positive number.
     """
     here = np.isfinite(states).all(axis=1)
     later, turned, growth = np.full_like(states, np.nan), np.full_like(states, np.nan), np.full(len(states), np.nan)
@@ -42,9 +42,9 @@ def stretched(
     ends = motions_from(system, states[here], **options)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         grown = np.einsum("nij,nj->ni", ends["derivative"].values, direction[here])
-        size = np.abs(grown).max(axis=1, keepdims=True)  # squares of what has grown by 1e200 are no numbers
+        size = np.abs(grown).max(axis=1, keepdims=True)  # squares of perturbations that have grown by 1e200 would overflow
         length = size[:, 0] * np.linalg.norm(grown / np.where(size > 0.0, size, 1.0), axis=1)
-        # What is captured at rest would have to be followed through all of its impacts, of which there are millions.
+        # Motions that are captured at rest are given up, as following their impacts to the rest would take millions of these.
         moving = (ends["side"].values != 0) & (stop_names(ends) != Stop.CAPTURED)
         gone = length == 0.0 if system.model.held else np.zeros(length.shape, dtype=bool)
         going = moving & np.isfinite(length) & ((length > 0.0) | gone)

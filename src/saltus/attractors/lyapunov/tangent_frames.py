@@ -1,4 +1,4 @@
-"""Many motions with orthonormal frames of derivatives beside them, in lanes: what stretches the frames, period by period."""
+"""Many motions with orthonormal frames of derivatives, in lanes: how much the frames are stretched in each period."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from saltus.systems import System
 
 @dataclass(frozen=True)
 class Stretched:
-    """The run of many motions; what was lost on the way has NaN from then on, and -inf once it rests with a loss at impacts."""
+    """The run of many motions; growth is NaN once a motion is lost, and -inf once it has come to rest with a loss at impacts."""
 
-    growth: np.ndarray  # (periods, n, 2): ln of what stretched each direction of the frame in the period
+    growth: np.ndarray  # (periods, n, 2): ln of the stretch of each direction of the frame in each period
     states: np.ndarray  # (n, 2): coordinate and velocity at the end; NaN where the motion was lost
 
 
@@ -73,7 +73,8 @@ def _groups(rows: np.ndarray) -> list[np.ndarray]:
 
 
 class _Follower:
-    """A group of motions with frames, a row of numbers for each: coordinate, its two derivatives, velocity, its two."""
+    """A group of motions with frames; the row of each has the coordinate, its two derivatives, the velocity, its two
+    derivatives."""
 
     def __init__(self, ensemble: TangentEnsemble, rows: np.ndarray, states: np.ndarray, lengths: np.ndarray) -> None:
         self._ensemble, self._rows, self._lengths = ensemble, rows, lengths

@@ -19,9 +19,9 @@ def separation_growth(
 ) -> np.ndarray:
     """ln(distance after a period / distance before) for each period, (periods,); -inf once both states are the same.
 
-    After each period the second state is moved back to the distance of 1e-7 along the line to it (Benettin, Galgani, Giorgilli
-    and Strelcyn, Meccanica 15 (1980) 9). Where it lies on the other side of the contact, or meets it once more, nothing is
-    special; of several contacts those that are closed stay so.
+    After each period the second state is moved along the line to the first one, back to the distance of 1e-7 (Benettin, Galgani,
+    Giorgilli and Strelcyn, Meccanica 15 (1980) 9). The two may lie on different sides of the contact, or have different numbers
+    of impacts. Of several contacts, those that are closed in the first state are closed in the second.
     """
     here = _vector(state)
     away = np.full(here.size, LYAPUNOV.distance / np.sqrt(here.size))

@@ -25,8 +25,8 @@ class EquilibriumSettings:
 
     grid: int = 2001  # Number of points of the window between which equilibria are looked for.
     difference: float = 1e-3  # Derivatives are central differences of sixth order with this step.
-    neutral: float = 1e-9  # A real part of at most this is 0: the differences leave it where no energy is lost.
-    inside: float = 1e-6  # Where the pull at the contact is 0, it is evaluated at this distance beside it.
+    neutral: float = 1e-9  # Real parts up to this count as 0: where no energy is lost the differences leave such an error.
+    inside: float = 1e-6  # If the acceleration at the contact is 0, its sign is that at this distance inside the side.
 
 
 SETTINGS = EquilibriumSettings()
@@ -44,9 +44,9 @@ class Equilibrium:
     side
         The side on which it lies, 0 at the contact.
     eigenvalues
-        The one with the larger real part first; None at the contact.
+        The eigenvalues, the one with the larger real part first; None at the contact.
     stable
-        No disturbance grows; it need not decay.
+        Whether no disturbance grows; disturbances need not decay.
 
     Examples
     --------
@@ -67,10 +67,10 @@ class Equilibrium:
 
 
 def equilibria(system: System, window: Box = PLANE) -> tuple[Equilibrium, ...]:
-    """The equilibria in a window of the phase plane, by their coordinate, the contact among them where it is one.
+    """The equilibria in a window of the phase plane, by their coordinate, including the contact if the system can rest there.
 
-    They are the zeros of the acceleration at rest between 2001 points of the window: two that are nearer to one another than a
-    thousandth of it, as beside a fold, may be missed.
+    They are the zeros of the acceleration at rest between 2001 points of the window: two equilibria that are closer together than
+    a thousandth of it, as near a fold, may be missed.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def equilibria(system: System, window: Box = PLANE) -> tuple[Equilibrium, ...]:
 
 
 def check_constant(system: System) -> None:
-    """Refuse what has no phase plane."""
+    """Refuse systems that have no phase plane."""
     check_system(system, "a phase plane", coordinates=1)
     check_periodic(system)
     for name, signal in system.load.channels.items():
@@ -120,7 +120,7 @@ def check_constant(system: System) -> None:
 
 
 def _pull(system: System, side: int) -> Callable[[float], float]:
-    """The acceleration at rest on a side, by the coordinate."""
+    """The acceleration at rest on a side, as a function of the coordinate."""
     return lambda place: float(system.model.acceleration(0.0, place, 0.0, float(side), system.load))
 
 
@@ -131,7 +131,7 @@ def _beside(system: System, side: int) -> float:
 
 
 def _zeros(pull: Callable[[float], float], grid: np.ndarray) -> Iterator[float]:
-    """Where the pull is 0, at or between the points of a grid."""
+    """The zeros of the acceleration, at or between the points of a grid."""
     from scipy.optimize import brentq
 
     values = np.array([pull(place) for place in grid])
@@ -152,7 +152,7 @@ def _eigenvalues(system: System, place: float, side: int) -> tuple[complex, comp
 
 
 def _at_contact(system: System) -> list[Equilibrium]:
-    """The contact, where all sides push towards it; or where two push away from it, so that neither wins."""
+    """The contact as an equilibrium: a stable one if all sides push towards it, an unstable one if both push away from it."""
     contact, outward = float(system.model.contact), []
     for side in system.model.sides:
         place = _beside(system, side)

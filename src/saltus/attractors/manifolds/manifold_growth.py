@@ -1,4 +1,4 @@
-"""Growing a curve: the image of a short segment under one forcing period after another, refined where it stretches or bends."""
+"""Growing a curve: the images of a short segment under 1, 2, ... forcing periods, refined where they stretch or bend."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ class GrowthSettings:
     rounds: int = 40  # The largest number of rounds of refinement, each of which halves the gaps.
     narrowest: float = 1e-13  # Gaps between parameters on the segment that are narrower than this are not halved.
     bend: float = 0.15  # The largest angle between neighbouring chords, rad.
-    short: float = 0.1  # Chords shorter than this, in steps, may bend by more.
-    torn: float = 2.0  # The image is torn where neighbours stay farther apart than this, in steps.
+    short: float = 0.1  # The angle at chords shorter than this, in steps, may be larger.
+    torn: float = 2.0  # The image has a gap where neighbours stay farther apart than this, in steps.
     reach: float = 3.0  # Points farther than this from the middle of the window, in half widths, are dropped.
 
 
@@ -38,7 +38,7 @@ class GrowthEnd(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """The image of the segment after `periods` forcing periods: points in order along it, nan where they have left."""
+    """The image of the segment after `periods` forcing periods: points in order along it, nan if they have left the window."""
 
     periods: int
     places: np.ndarray  # (n,): the parameter on the segment, in [0, 1]
@@ -52,19 +52,19 @@ def has_left(window: Window, points: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Growth:
-    """A segment, the flow that carries it on, and how finely its images cover which window."""
+    """A segment, the flow that maps it, the window in which its images are wanted, and how fine they are."""
 
     segment: Segment
     flow: Flow
     window: Window
     step: float  # the longest chord, in half widths of the window
-    most: int  # points of all images
+    most: int  # the largest number of points of all images together
 
     def levels(self, count: int) -> tuple[list[Level], GrowthEnd]:
         """The images under 0, 1, 2, ..., `count` forcing periods, and why there are no more.
 
-        Each is as fine as the window asks for: a new point begins on the segment and is followed through all periods, so it lies
-        on the curve as exactly as the flow is known.
+        Each is refined where it lies in the window. A new point begins on the segment and is followed through all periods, so it
+        lies on the curve as exactly as the flow is known.
         """
         places = np.linspace(0.0, 1.0, 9)
         points = self.segment(places)
@@ -91,7 +91,7 @@ class Growth:
         return result if periods else points
 
     def _refined(self, periods: int, places: np.ndarray, points: np.ndarray, room: int) -> tuple[np.ndarray, np.ndarray, bool]:
-        """Insert points until no two neighbours are farther apart than the step; True where there is no room for more."""
+        """Insert points until no two neighbours are farther apart than the step; the flag is True if `room` does not suffice."""
         for _ in range(SETTINGS.rounds):
             gaps = np.flatnonzero(self._coarse(places, points))
             if not gaps.size:
@@ -104,14 +104,14 @@ class Growth:
         return places, points, False
 
     def _parted(self, places: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The points with nan between neighbours that refinement has not brought together: the image is torn there."""
+        """The points with nan between neighbours that refinement has not brought close together: the image has a gap there."""
         scaled = self.window.scaled(points)
         torn = np.flatnonzero(np.abs(np.diff(scaled, axis=0)).max(axis=1) > SETTINGS.torn * self.step) + 1
         torn = torn[_may_cross(scaled)[torn - 1] | (np.abs(scaled) <= 1.0).all(axis=1)[torn]]
         return np.insert(places, torn, places[torn]), np.insert(points, torn, np.nan, axis=0)
 
     def _coarse(self, places: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Which gaps between neighbours are to be divided, (n - 1,): long chords, bends, and the last steps on the way out."""
+        """Which chords between neighbours are to be divided, (n - 1,): long ones, bends, and those that may cross the window."""
         scaled = self.window.scaled(points)
         chords = np.diff(scaled, axis=0)
         length = np.hypot(chords[:, 0], chords[:, 1])

@@ -1,6 +1,6 @@
 """Separatrices of the phase plane under a constant load: the stable manifolds of its saddles, by the exact backward flow.
 
-A saddle is left and approached along (1, lambda), lambda its eigenvalues (see `equilibria`).
+The manifolds of a saddle are tangent to (1, lambda) there, with its eigenvalues lambda (see `equilibria`).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class SeparatrixSettings:
     """How a separatrix is followed."""
 
     offset: float = 1e-6  # Distance from the saddle at which it begins, on the tangent: the error is of the order of its square.
-    # It ends when it comes within this distance of a saddle, after it has been ten times as far from all saddles.
+    # It ends within this distance of a saddle, once it has been ten times as far from all saddles.
     close: float = 1e-4
     span: float = 2.0  # The dimensionless time for which one call of `simulate` follows it.
 
@@ -42,7 +42,7 @@ class SeparatrixEnd(StrEnum):
 
     WINDOW = "window"  # it has left the window for good
     SADDLE = "saddle"
-    SPAN = "span"  # the time asked for is over
+    SPAN = "span"  # it was followed for all of the time asked for
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -62,7 +62,7 @@ class Separatrix(Result):
     velocity
         (n,), its rate.
     impacts
-        (m, 2): the times and velocities, just before each, of the impacts of the forward motion, latest first.
+        (m, 2): the times of the impacts of the forward motion and the velocities just before them, latest first.
     end
         Why it ends.
 
@@ -110,8 +110,8 @@ def saddles(system: System, window: Box = PLANE) -> tuple[Equilibrium, ...]:
 def separatrices(system: System, window: Box = PLANE, *, span: float = 60.0, step: float = 0.02) -> tuple[Separatrix, ...]:
     """The stable manifolds of all saddles in a window: the curves that separate the basins under a constant load.
 
-    Each branch is followed back for at most `span` of time, until it leaves the window for good (three half widths) or comes to
-    a saddle, and given every `step` of time.
+    Each branch is followed back for at most a time `span`, until it leaves the window for good (three half widths) or comes to a
+    saddle; points are given every `step` of time.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def separatrices(system: System, window: Box = PLANE, *, span: float = 60.0, ste
 def _branch(
     system: System, saddle: Equilibrium, away: float, saddles: np.ndarray, window: Window, times: tuple[float, float]
 ) -> Separatrix:
-    """The branch to one side of a saddle, for at most a span of time with a step; `saddles` are the places of all, (n,)."""
+    """The branch to one side of a saddle; `saddles` are the coordinates of all saddles, (n,), `times` are `span` and `step`."""
     assert saddle.eigenvalues is not None
     backward = reversed_system(system)
     span, step = times

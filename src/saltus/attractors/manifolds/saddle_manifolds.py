@@ -1,13 +1,13 @@
-"""Stable and unstable manifolds of saddle orbits in the stroboscopic section: the curves that bound basins, computed.
+"""Stable and unstable manifolds of saddle orbits in the stroboscopic section; the stable ones are the curves between basins.
 
-The stroboscopic map P takes a state at phase 0 to the one a forcing period later. A saddle orbit of q periods has q points x_i
-with P(x_i) = x_{i+1}, and P^q has there the multipliers mu_s, mu_u with abs(mu_s) < 1 < abs(mu_u) and their directions. The
+The stroboscopic map P takes a state at phase 0 to the state a forcing period later. A saddle orbit of period q has q points x_i
+with P(x_i) = x_{i+1}, at which P^q has the multipliers mu_s, mu_u with abs(mu_s) < 1 < abs(mu_u) and directions v_s, v_u. The
 stable manifold of x_0 is the union of the images of its fundamental segment
 
     x_0 + d rho^s v_s,    0 <= s <= 1,    rho = 1 / abs(mu_s),
 
-under P^{-q}, P^{-2q}, ..., d small and of both signs; the images under other powers of P^{-1} lie on those of the other points.
-P^{-1} is the flow of the reversed system over a period, event by event, as exact as the forward one.
+under P^{-q}, P^{-2q}, ..., with small d of both signs; the images under the other powers of P^{-1} lie on the manifolds of the
+other points. P^{-1} is the flow of the reversed system over a period, event by event, as exact as the forward flow.
 """
 
 from __future__ import annotations
@@ -37,23 +37,23 @@ if TYPE_CHECKING:
 class ManifoldSettings:
     """Where manifolds begin, and how exactly they are followed."""
 
-    offset: float = 1e-6  # d: the segment lies off the manifold by its square, which shrinks from there on.
+    offset: float = 1e-6  # d: the segment misses the manifold by about d^2, and its images miss it by less and less.
     tolerance: float = 1e-13  # The error of a step of the motions along a manifold.
     hyperbolic: float = 1e-6  # The least difference of the multipliers' moduli from 1.
 
 
 MANIFOLDS = ManifoldSettings()
-PLANE = ((-3.0, 3.0), (-3.0, 3.0))  # the window of the state plane in which curves are wanted where none is given
+PLANE = ((-3.0, 3.0), (-3.0, 3.0))  # the window of the state plane if none is given
 
 
 @dataclass(frozen=True, eq=False)
 class ManifoldBranch:
     """One branch of a manifold of one point of the orbit: from the orbit on, nan where it is outside the window."""
 
-    point: int  # of the orbit, which at phase 0 is at `orbit_states[point]`
+    point: int  # the index of the orbit's point, `orbit_states[point]`
     side: int  # +1 or -1: along or against the direction
     states: np.ndarray  # (n, 2): coordinate and velocity at phase 0
-    place: np.ndarray  # (n,): s + forcing periods / q, which the map shifts by 1 / q
+    place: np.ndarray  # (n,): s + (number of forcing periods) / q; the map (for a stable manifold its inverse) adds 1 / q
     end: GrowthEnd  # why it does not go on
 
 
@@ -72,9 +72,9 @@ class Manifold(Result):
     orbit_states
         (q, 2): the orbit at phase 0.
     directions
-        (q, 2): unit vectors along the manifold there.
+        (q, 2): unit vectors along the manifold at these states.
     branches
-        The two branches, or, of a flip saddle, those of both signs.
+        The branches to both sides of each point of the orbit.
 
     Examples
     --------
@@ -128,21 +128,21 @@ def stable_manifold(
     step: float = 0.01,
     points: int = 100_000,
 ) -> Manifold:
-    """The states that the flow takes to a saddle orbit, as curves in the section at phase 0: where basins meet.
+    """The states that the flow takes to a saddle orbit, as curves in the section at phase 0, at which basins meet.
 
     Parameters
     ----------
     orbit
-        With one multiplier inside the unit circle and one outside.
+        A saddle orbit: one multiplier is inside the unit circle and one outside.
     window
-        Of the coordinate and of the velocity, in which the curves are wanted; they are followed outside it up to three
-        half widths from its middle.
+        ((least, largest coordinate), (least, largest velocity)), in which the curves are wanted; they are followed outside it up
+        to three half widths from its middle.
     periods
-        For how many forcing periods back.
+        The number of forcing periods for which the curves are followed backward.
     step
-        The longest distance between neighbours in the window, in its half widths; they are closer in bends.
+        The longest distance between neighbouring points in the window, in its half widths; they are closer in bends.
     points
-        The most for each of the two sides.
+        The largest number of points for each of the two sides.
 
     Raises
     ------
@@ -170,7 +170,7 @@ def unstable_manifold(
     step: float = 0.01,
     points: int = 100_000,
 ) -> Manifold:
-    """The states that the flow takes away from a saddle orbit: as `stable_manifold`, forward in time.
+    """The states that the backward flow takes to a saddle orbit: as `stable_manifold`, with the time reversed.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def unstable_manifold(
     step
         The longest distance between two points, in units of the window's half widths.
     points
-        How many points at most.
+        The largest number of points for each of the two sides.
 
     Examples
     --------
@@ -256,9 +256,9 @@ def _flow(system: System, backward: bool) -> Any:
 
 
 def _branches(levels: list[Level], q: int, side: int, stable: bool, turns: bool, end: GrowthEnd) -> list[ManifoldBranch]:
-    """The levels that belong to each point of the orbit, put together from the orbit on.
+    """The levels joined to the branches of each point of the orbit, from the orbit on.
 
-    Where mu < 0 a round of the orbit, from point 0 to point 0, turns the side.
+    If the multiplier is negative, the branches change sides each time that the orbit is back at point 0.
     """
     curves = []
     for first in range(min(q, len(levels))):

@@ -33,15 +33,15 @@ def classify(
     """Where a motion ends: at rest, on a periodic orbit, on a torus, in chaos, or undecided, each with its evidence.
 
     * `rest`: proved to stay at the contact for all later loads (`capture_speed`), or at rest there where the load never pulls.
-    * `periodic`: it repeats itself, and the orbit solves its own equations, has all multipliers inside the unit circle, repeats
-      in direct simulation, and is met by the motion. Under constant loads an equilibrium is such an orbit, of period 1.
-    * `chaotic`: not settled after transient + periods; then a largest Lyapunov exponent above 0 by more than its error and the
-      growth of regular motions, in both halves of a run and of one twice as long that goes on from it; and none of 128 motions
-      from states beside the last one settles within `periods`, or 2000 forcing periods if that is more. Chaotic transients,
-      which end at random, are seen by that with a probability of 95 % while they last less than 43 times as long in the mean.
-      The 0-1 test is recorded beside it, and must not contradict.
-    * `quasi-periodic`: only where `excludes_tori` knows no reason against it: exponents of 0 within their error and resolution,
-      and a 0-1 test that sees order.
+    * `periodic`: it repeats itself, and is on an orbit that solves its own equations, has all multipliers inside the unit circle
+      and repeats itself in direct simulation. Under constant loads an equilibrium is such an orbit, of period 1.
+    * `chaotic`: it has not settled after transient + periods. The largest Lyapunov exponent is above 0 by more than its error and
+      the growth of regular motions, in both halves of a run and of a second one, twice as long, that continues the first. None of
+      128 motions from states beside the last one settles within `periods`, or 2000 forcing periods if that is more: a chaotic
+      transient would be noticed with a probability of 95 % if its mean life is less than 43 times as long. The 0-1 test, a
+      second opinion, does not show a regular motion.
+    * `quasi-periodic`: the exponents are 0 within their error and resolution, the 0-1 test shows a regular motion, and
+      `excludes_tori` knows no reason against it.
     * `undecided`: everything else, with the reason.
 
     Parameters
@@ -51,13 +51,13 @@ def classify(
     velocity, coordinates
         The state at the start, at phase 0.
     periods
-        How long it may take, in forcing periods: so many for settling, so many for the exponents; at least 96.
+        Forcing periods in which it may settle, after the transient, and as many again for the exponents; at least 96.
     transient
-        How many to let pass first.
+        Forcing periods at the beginning.
     max_period
         The longest period looked for, at least 16.
     seed
-        Of the companions' states and the frequencies of the 0-1 test.
+        The seed of the companions' states and of the frequencies of the 0-1 test.
     tol
         The error that one step may make.
     progress
@@ -92,7 +92,7 @@ def _start(system: System, velocity: Any, coordinates: dict[str, float]) -> np.n
     Raises
     ------
     ParameterError
-        Names or values that are none.
+        Names of other coordinates, or values that are no numbers.
     """
     names = system.model.coordinates
     if set(coordinates) != set(names):

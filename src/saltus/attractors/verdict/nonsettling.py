@@ -1,4 +1,4 @@
-"""Motions that do not settle: chaos, a torus, or nothing that the numbers support."""
+"""The verdict on motions that do not settle: chaos, a torus, or undecided."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from saltus.progress import part_of
 
 @dataclass(frozen=True)
 class NonsettlingSettings:
-    """How motions are judged that do not settle."""
+    """How motions that do not settle are judged."""
 
     thirds: int = 3  # The first estimate of the exponents takes one of three parts of `periods`, the second one the other two.
-    states: int = 2000  # Number of stroboscopic states that the 0-1 test gets.
+    states: int = 2000  # Number of stroboscopic states for the 0-1 test.
     chaos: float = 0.8  # The 0-1 test shows chaos where its K is above this.
     order: float = 0.2  # It shows a regular motion where its K is below this; between the two values it decides nothing.
-    # The least number of forcing periods for which companions are followed: an orbit is recognised hundreds of periods after it
-    # is reached.
+    # The least number of forcing periods for which companions are followed: it takes hundreds of periods on an orbit until this
+    # is recognised.
     least: int = 2000
-    # Number of companions: motions from states beside the last one, which show whether the chaos is transient.
+    # Number of companions: motions from states beside the last state, which show whether the chaos is transient.
     companions: int = 128
-    # Distance of their first states from the last one: a chaotic motion of exponent 0.03 forgets it within 500 units of time.
+    # Distance of their first states from the last state: chaos of exponent 0.03 separates them within 500 units of time.
     aside: float = 1e-6
 
 
@@ -41,18 +41,18 @@ SETTINGS = NonsettlingSettings()
 
 @dataclass(frozen=True)
 class _Judged:
-    """What is known of a motion that has not settled."""
+    """The results for a motion that has not settled, from which its verdict follows."""
 
     case: VerdictRequest
     ends: Recurrence
-    last: Exponents  # of the last and longest run
+    last: Exponents  # those of the last and longest run
     opinion: ZeroOne | None
-    periods: int  # that it was followed in all
+    periods: int  # forcing periods for which it was followed in all
     evidence: dict[str, Any]
 
     @property
     def given(self) -> dict[str, Any]:
-        """What every verdict on it holds."""
+        """The fields that are the same in every verdict on the motion."""
         return {
             "exponents": self.last,
             "zero_one": self.opinion,
@@ -99,7 +99,7 @@ def unsettled(case: VerdictRequest, ends: Recurrence) -> Verdict:
 
 
 def _runs(case: VerdictRequest, state: np.ndarray) -> list[Exponents]:
-    """Exponents of a run and of one twice as long that goes on from there."""
+    """The exponents of a run, and of a second one, twice as long, that continues the first."""
     third, at = case.periods // SETTINGS.thirds, start_at(case.system, state)
     runs: list[Exponents] = []
     for span, part in ((third, (0.1, 0.1 + 0.8 / 3)), (2 * third, (0.1 + 0.8 / 3, 0.9))):
@@ -130,7 +130,7 @@ def _evidence(runs: list[Exponents], opinion: ZeroOne | None) -> dict[str, Any]:
 
 
 def _beside(case: VerdictRequest, state: dict[str, Any]) -> Recurrence:
-    """How motions end that begin at a state, the first, and beside it."""
+    """The ends of motions from a state (the first row) and from states beside it."""
     row = state_vector(case.system, state)
     around = np.random.default_rng(int(case.seed)).uniform(-SETTINGS.aside, SETTINGS.aside, (SETTINGS.companions, row.size))
     states = states_beside(case.system, row, np.concatenate([np.zeros((1, row.size)), around]))
@@ -138,7 +138,7 @@ def _beside(case: VerdictRequest, state: dict[str, Any]) -> Recurrence:
 
 
 def _after_all(verdict: Verdict, judged: _Judged) -> Verdict:
-    """The verdict on a motion that has settled in the end, after the exponents of its transient were taken."""
+    """The verdict on a motion that has settled after all, after the exponents of its transient were computed."""
     last, before = judged.last, judged.periods
     chaos = f" of transient chaos with an exponent of {last.values[0]:.4g}" if last.positive else ""
     return replace(
@@ -150,7 +150,7 @@ def _after_all(verdict: Verdict, judged: _Judged) -> Verdict:
 
 
 def _chaotic(judged: _Judged) -> Verdict:
-    """Chaos, unless it has a way out or the 0-1 test sees order."""
+    """The verdict chaos, or undecided if companions have settled or the 0-1 test shows a regular motion."""
     case, ends, opinion = judged.case, judged.ends, judged.opinion
     if judged.evidence["companions_settled"]:
         return case.undecided(Reason.TRANSIENT, ends, judged.numbers, **judged.given)
@@ -164,7 +164,7 @@ def _chaotic(judged: _Judged) -> Verdict:
 
 
 def _regular(judged: _Judged) -> Verdict:
-    """A motion that has not settled and whose largest exponent is not surely above 0."""
+    """The verdict on a motion that has not settled and whose largest exponent is not surely above 0."""
     case, last, given = judged.case, judged.last, judged.given
     against = excludes_tori(case.system)
     if against is None and judged.ordered and abs(last.values[0]) <= float(last.errors[0] + last.resolution):

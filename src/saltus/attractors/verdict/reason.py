@@ -1,4 +1,4 @@
-"""Why a verdict is what it is: one sentence for each reason, with places for its numbers."""
+"""The reasons of verdicts: a sentence for each, with places for its numbers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether a system can move quasi-periodically at all (errata 22)."""
+"""Whether a system can have quasi-periodic motions at all (errata 22)."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ def excludes_tori(system: System) -> str | None:
     Under one forcing frequency a quasi-periodic motion lies on closed curves that the stroboscopic map P (or, where a curve is
     mapped to another one, a power of it) carries onto themselves. There is none where
 
-    * P is continuous on the plane of states, in which the states before and after an impact are one point. It is, unless the
-      contact pushes away on both sides at one instant, where motions beside the state of rest are torn apart: for equal layers,
-      where V cos(beta0) > 0. Bounces from one wall tear nothing apart, nor does a contact that changes neither the velocity nor
-      the acceleration, and a system without contact has no corner;
+    * P is continuous on the plane of states, in which the states before and after an impact are one point. It is discontinuous
+      only if the contact pushes away on both sides at one instant, as motions beside the state of rest then leave to different
+      sides: for equal layers, where V cos(beta0) > 0. It is continuous with bounces from one wall, with a contact that changes
+      neither the velocity nor the acceleration, and without a contact;
     * and P shrinks areas: da/dv < 0 on every side, and no impact raises the speed.
 
-    For then P maps the curve onto itself and, being continuous, the area within onto at least itself; and it has less to give.
-    Both are checked by interval bounds over all of the forcing period and all states. Sufficient, not necessary: a load of which
-    the bounds do not decide is one that may have tori.
+    For then P maps the curve onto itself and, being continuous, the area within the curve onto at least the same area, although
+    it shrinks areas. Both conditions are checked by interval bounds over the whole forcing period and all states. They are
+    sufficient, not necessary: if the bounds decide nothing, the system may have tori.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def excludes_tori(system: System) -> str | None:
     Raises
     ------
     ParameterError
-        What is no system; a load by records.
+        Something that is no system; a load by records or pulses.
 
     Examples
     --------
@@ -63,7 +63,7 @@ def excludes_tori(system: System) -> str | None:
 
 
 def _continuous(system: System) -> str | None:
-    """Why motions that begin close together stay so for a while; None where the contact may push away on both sides."""
+    """Why the stroboscopic map is continuous, as a part of a sentence; None if the contact may push away on both sides."""
     traced = trace(system)
     if traced.sides == 0:
         return "the motion has no contact"

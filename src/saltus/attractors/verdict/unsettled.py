@@ -1,6 +1,6 @@
-"""What becomes of motions that have not settled: chaos, a transient, or a periodic motion of long period; many questions at once.
+"""The judgement of motions that have not settled: chaos, a transient, or a periodic motion of long period; many at once.
 
-Charts and diagrams both ask this function, so that they cannot contradict each other.
+Charts and diagrams both use it, so that they cannot contradict each other.
 """
 
 from __future__ import annotations
@@ -45,34 +45,34 @@ class JudgementSettings:
     # Number of companions: motions from the states of a question, which stand for all motions there.
     companions: int = 24
     first_periods: int = 250  # The first round in forcing periods; most transients end in it, and need no exponents.
-    round_periods: int = 1000  # The length of each further round. After a round survivors take the places of what has settled.
+    round_periods: int = 1000  # The length of each further round. After a round survivors replace the companions that settled.
     rounds: int = 12  # The largest number of further rounds.
     # Forcing periods, added up over companions, in which none may settle. If none has settled within E, transients of a mean life
     # of E / 3 or less are excluded with a probability of 95 %, as the number that settle within E is Poisson distributed.
     exposure: int = 30_000
-    # Number of those that must have settled, where others go on: a life is estimated from three to within a factor of about 3.
-    # Where some settle and others stop to do so, these must outlast three of the lives that the former show.
+    # Number of companions that must have settled for the verdict of a transient while others go on: from three, a mean life is
+    # estimated to within a factor of about 3. If some settle and then no more do, chaos takes a time without settling of three of
+    # the mean lives that the former show.
     settled: int = 3
-    # After so many rounds companions are called a transient if the rate at which they settle in the later half of the rounds is
-    # not less than this share of the rate in the earlier half: if some were on an attractor, they would become ever more of them.
-    # Pure transients take five rounds on an average; the rounds that are left are for those beside an attractor.
+    # After so many rounds the motions are called a transient if the rate at which companions settle in the later half of the
+    # rounds is at least this share of the rate in the earlier half: if some were on an attractor, their share of the companions
+    # would grow, and the rate would fall. Pure transients take five rounds on average, those beside an attractor more.
     fewest_rounds: int = 4
     steady: float = 0.9
-    # Number of survivors of which the exponent is measured, all of which are samples of one attractor.
+    # Number of survivors whose exponent is measured; they are taken as samples of one attractor.
     measured: int = 12
-    # Forcing periods of the shortest run of these, which is doubled up to the longest one as long as it leaves open what the
-    # exponent is: weak chaos of exponent 0.005 takes a thousand periods.
+    # Forcing periods of the shortest run of these survivors, which is doubled up to the longest one as long as the sign of the
+    # exponent is open: weak chaos of exponent 0.005 takes a thousand periods.
     shortest_run: int = 64
     longest_run: int = 1600
-    # From a run of this length on, a long period is looked for where the exponent seems to be below 0: if there is one, longer
-    # runs are spared.
+    # From a run of this length on, a long period is looked for if the exponent seems to be below 0: one saves longer runs.
     regular_run: int = 256
-    # Distance between the beginnings of companions from one state, or they would all be one motion. Chaos of exponent 0.005
-    # brings them apart within 3000 units of time; those from several states are apart from the beginning.
+    # Distance between the first states of companions from one state, as they would else be one motion. Chaos of exponent 0.005
+    # separates them within 3000 units of time.
     apart: float = 1e-7
     longest_period: int = 128  # The longest period looked for in a regular motion that has not settled, in forcing periods.
-    patience: int = 4000  # Forcing periods for which such a motion is followed, so that multipliers up to 0.99 may settle.
-    tol: float = 1e-10  # The error of a step: with 1e-8, some motions that have settled do not come back near enough to be seen.
+    patience: int = 4000  # Forcing periods for which such a motion is followed, so that it settles with multipliers up to 0.99.
+    tol: float = 1e-10  # The error of a step: with 1e-8, some periodic motions do not return near enough to be recognised.
 
 
 JUDGEMENT = JudgementSettings()
@@ -80,9 +80,9 @@ JUDGEMENT = JudgementSettings()
 
 @dataclass(frozen=True, eq=False)
 class Earlier:
-    """What a less careful judgement has shown of chaos from whose states a further one starts, an entry for each question."""
+    """What a less careful judgement has shown of the chaos from whose states a further one starts, an entry for each question."""
 
-    exponent: np.ndarray  # (n,): which is surely above 0
+    exponent: np.ndarray  # (n,): the largest exponent, which is surely above 0
     error: np.ndarray  # (n,): half width of its 95 % interval
     quiet: np.ndarray  # (n,): forcing periods of companions, in all, in which none has settled
 
@@ -93,11 +93,11 @@ class Judged:
 
     verdict: np.ndarray  # (n,): an `Unsettled` each
     doubt: np.ndarray  # (n,): a `Doubt` each
-    exponent: np.ndarray  # (n,): the largest one of what has not settled, per unit of time; nan where all settled at once
+    exponent: np.ndarray  # (n,): largest exponent of those that have not settled, per unit of time; nan if all settle at once
     error: np.ndarray  # (n,): half width of its 95 % interval
     gone: np.ndarray  # (n,): how many companions have settled, or were ended by a limit of the model
-    life: np.ndarray  # (n,): mean life of a transient in forcing periods; of chaos the one that is excluded with 95 %
-    period: np.ndarray  # (n,): forcing periods after which a periodic motion repeats itself, 0 where that is not known
+    life: np.ndarray  # (n,): mean life of a transient in forcing periods; of chaos the mean life that is excluded with 95 %
+    period: np.ndarray  # (n,): forcing periods after which a periodic motion repeats itself, 0 if that is not known
     states: np.ndarray  # (n, companions, d): the last stroboscopic states, of survivors where there are any
     settled: SettledLater  # what companions settled on
 
@@ -134,27 +134,27 @@ def judge_unsettled(
 ) -> Judged:
     """Whether motions that have not settled are chaotic, transient, or periodic after all.
 
-    A question is a set of stroboscopic states under one set of parameters: the last ones of a motion, or of several motions that
-    have not settled. Companions start at them and are followed in rounds. Chaos takes two things. The average of the survivors'
-    largest exponents is above 0 by more than its 95 % error and the resolution 2 ln(t) / t. And within
-    a number of forcing periods, added up over companions, none settles: settling from chaotic transients is a Poisson process,
-    whose rate is estimated or bounded by that. If some settle, their places are taken by survivors, so that an attractor beside a
-    transient becomes an ever larger share of the companions, and shows itself by three mean lives in which none settles. If the
-    rate at which companions settle does not fall there is no such attractor.
+    A question is a set of stroboscopic states under one set of parameters: the last states of a motion, or of several motions,
+    that have not settled. Companions start at these and are followed in rounds. Chaos takes two conditions. The average of the
+    survivors' largest exponents is above 0 by more than its 95 % error and the resolution 2 ln(t) / t. And within a number of
+    forcing periods, added up over companions, none settles: settling from chaotic transients is a Poisson process, whose rate is
+    estimated or bounded by this number. If some settle, survivors take their places; if there is a chaotic attractor beside the
+    transient, the share of companions on it grows, until none settles within three mean lives of the transient. If the rate at
+    which companions settle does not fall, there is no such attractor.
 
     Parameters
     ----------
     system
         What moves, under a load with a frequency.
     states
-        (n, m, d), coordinates and velocities at phase 0; rows of nan are left out, a question needs one other.
+        (n, m, d), coordinates and velocities at phase 0; rows of nan are left out, and each question needs one other row.
     parameters
         Numbers by dotted path, (n,) each, in place of the system's.
     settings
-        How long is looked, and how surely.
+        How long companions are followed, and how surely transients are excluded.
     earlier
-        What is known already, if the states are those of a judgement that has found chaos: its exponent is not measured again,
-        and the time in which none has settled counts.
+        The results of an earlier judgement that has found chaos, if the states are those that it gave: the exponent is not
+        measured again, and the time in which none has settled is counted.
     progress
         Called with the fraction done.
     """
@@ -175,24 +175,24 @@ def judge_unsettled(
 
 @dataclass(eq=False)
 class _Judgement:
-    """The questions on their way."""
+    """The state of a judgement of several questions."""
 
     system: System
     parameters: dict[str, np.ndarray]
     settings: JudgementSettings
     states: np.ndarray  # (n, companions, d)
-    open: np.ndarray  # (n,): still to be followed
+    open: np.ndarray  # (n,): whether companions are still to be followed
     positive: np.ndarray  # (n,): whether the exponent is surely above 0
-    negative: np.ndarray  # (n,): surely below
+    negative: np.ndarray  # (n,): whether it is surely below 0
     exponent: np.ndarray
     error: np.ndarray
     period: np.ndarray
     gone: np.ndarray  # (n,): number of companions that have settled, or have ended
-    ended: np.ndarray  # (n,): number of those that a limit of the model has ended
-    exposure: np.ndarray  # (n,): forcing periods of companions in all
-    rounds: np.ndarray  # (n,): how often they were followed
-    history: np.ndarray  # (2, rounds, n): how many of them settled in each round, and its forcing periods
-    before: np.ndarray  # (n,): those of the rounds up to the last one in which any settled
+    ended: np.ndarray  # (n,): number of companions among these that a limit of the model has ended
+    exposure: np.ndarray  # (n,): forcing periods for which companions were followed, added up
+    rounds: np.ndarray  # (n,): number of rounds
+    history: np.ndarray  # (2, rounds, n): number of companions that settled in each round, and the round's exposure
+    before: np.ndarray  # (n,): the exposure up to the end of the last round in which any settled
     all_gone: np.ndarray  # (n,): whether no companion is left
     looked: np.ndarray  # (n,): whether a long period was looked for
     settled: SettledLater
@@ -238,7 +238,7 @@ class _Judgement:
         )
 
     def follow(self, periods: int, progress: Progress) -> None:
-        """A round: what settles is counted, and survivors take its place."""
+        """Follow companions for a round: those that settle are counted, and survivors take their places."""
         rows = np.flatnonzero(self.open)
         if not rows.size:
             return
@@ -266,7 +266,7 @@ class _Judgement:
 
     @property
     def _lacking(self) -> np.ndarray:
-        """In how many more forcing periods of companions none may settle, so that a transient is excluded, (n,)."""
+        """The further exposure in which none may settle until a transient is excluded, (n,)."""
         life = self.before / np.maximum(self.gone, 1)
         return np.asarray(np.maximum(self.settings.exposure, 3.0 * life) - (self.exposure - self.before))
 
@@ -279,20 +279,20 @@ class _Judgement:
         return np.asarray(does_not_fall & (left >= self.settings.settled) & (self.rounds >= self.settings.fewest_rounds))
 
     def may_last(self, rounds: int) -> np.ndarray:
-        """Where so many more rounds can exclude a transient, or are needed to call it one, (n,)."""
+        """Where so many more rounds may exclude a transient, or may show enough settled companions to call it one, (n,)."""
         within = self._lacking <= rounds * self.settings.round_periods * self.settings.companions
         return np.asarray(within | (self.gone < self.settings.settled))
 
     def _keep_settled(self, rows: np.ndarray, ends: Recurrence) -> None:
-        """Remember on what companions have settled."""
+        """Keep the motions on which companions have settled."""
         here = np.flatnonzero(ends.periodic)
         question = rows[here // self.settings.companions]
         self.settled = self.settled.joined(SettledLater(question, ends.last[here], ends.period[here]))
 
     def measure(self) -> None:
-        """The exponents of some survivors, by ever longer runs as long as these leave open whether they are positive.
+        """Measure the exponents of some survivors, by longer and longer runs until their sign is known.
 
-        Longer runs are spared where the exponent seems to be below 0 and a motion repeats itself after a long period.
+        There are no longer runs if the exponent seems to be below 0 and a motion repeats itself after a long period.
         """
         rows, settings = np.flatnonzero(self.open), self.settings
         if not rows.size:
@@ -313,7 +313,10 @@ class _Judgement:
                 self.look_for_long_periods(self.open & (self.exponent < 0.0))
 
     def look_for_long_periods(self, chosen: np.ndarray) -> None:
-        """Follow those of the chosen, (n,), not surely chaotic until they settle: near bifurcations exponents are near 0."""
+        """Follow a motion of each of the chosen questions, (n,), until it settles, unless the exponent is surely positive.
+
+        Near bifurcations exponents are near 0, and motions settle slowly.
+        """
         rows = np.flatnonzero(chosen & ~self.positive & ~self.all_gone & ~self.looked)
         if not rows.size:
             return
@@ -327,7 +330,7 @@ class _Judgement:
         self.settled = self.settled.joined(SettledLater(rows, ends.last, fewest))
 
     def judged(self) -> Judged:
-        """The verdicts that follow from what was counted and measured."""
+        """The verdicts that follow from the counts and the exponents."""
         n = len(self.open)
         verdict, doubt = np.full(n, Unsettled.UNDECIDED), np.full(n, Doubt.NEAR_ZERO)
         lasts = self.positive & ~self.all_gone & self.lasts
@@ -345,6 +348,6 @@ class _Judgement:
 
 
 def _companions(system: System, states: np.ndarray, settings: JudgementSettings) -> np.ndarray:
-    """So many states, beside these (m, d), spread evenly over them."""
+    """The first states of companions, (companions, d): beside these states (m, d), each of which is taken about equally often."""
     chosen = states[np.linspace(0, len(states) - 1, settings.companions).astype(int)]
     return states_beside(system, chosen, settings.apart * np.arange(settings.companions)[:, None])

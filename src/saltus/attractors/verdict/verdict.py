@@ -24,7 +24,7 @@ from saltus.systems import System
 if TYPE_CHECKING:
     import xarray
 
-SECTION_STATES = 1000  # of a motion that does not repeat: enough for its attractor's shape to be seen
+SECTION_STATES = 1000  # states of a motion that does not repeat, enough to see the shape of its attractor
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,25 +36,25 @@ class Verdict(Result):
     system
         What moves.
     kind
-        What it is.
+        The kind of motion on which it ends.
     cause
-        Why it is said to be so.
+        The reason for this kind.
     reason
-        The sentence of the cause, with its numbers.
+        The sentence of the reason, with its numbers.
     period
-        The forcing periods after which it repeats itself; None where it does not.
+        The forcing periods after which it repeats itself; None if it does not.
     orbit
-        Its orbit, solved by its own equations, attracting, and met by the motion; else None.
+        The attracting orbit on which the motion is, solved by its own equations; else None.
     exponents
-        The exponents of the last and longest run; None where the motion has settled.
+        The Lyapunov exponents of the last and longest run; None if the motion has settled.
     zero_one
-        The second opinion, from the states at phase 0; None where the motion has settled.
+        The 0-1 test of the states at phase 0, as a second opinion; None if the motion has settled.
     state
         The state at the end, at phase 0, as arguments of `simulate`.
     periods
-        How many forcing periods the motion was followed in all.
+        The number of forcing periods for which the motion was followed in all.
     evidence
-        Numbers and sentences by their names.
+        The evidence: numbers and sentences by their names.
 
     Examples
     --------
@@ -78,8 +78,8 @@ class Verdict(Result):
     def to_xarray(self) -> xarray.Dataset:
         """The verdict and its evidence as single values, and the motion at its end.
 
-        `section_<variable>` are its states at phase 0 over `state`, `curve_<variable>` one period of its orbit over `time`, if it
-        is on one.
+        `section_<variable>` are its states at phase 0 over `state`; if it is on an orbit, `curve_<variable>` is one period of the
+        orbit over `time`.
         """
         known = {"kind": str(self.kind), "reason": self.reason, "period": self.period or 0, "followed": self.periods}
         columns: dict[str, tuple[Any, ...]] = {
@@ -94,7 +94,7 @@ class Verdict(Result):
         return result_dataset("verdict", columns, None, self.system, plane=list(plane))
 
     def _section(self) -> np.ndarray:
-        """States at phase 0 from the end of the motion on, (n, d): its period of them, or many where it does not repeat."""
+        """States at phase 0 from the end of the motion on, (n, d): those of one period, or many if it does not repeat itself."""
         end = state_vector(self.system, self.state)
         lasting = self.kind not in (AttractorKind.REST, AttractorKind.UNDECIDED) and self.system.load.period is not None
         if not lasting:
@@ -113,10 +113,10 @@ class Verdict(Result):
 
 @dataclass(frozen=True)
 class VerdictRequest:
-    """One question: a motion's system, and how long and how exactly it is looked at."""
+    """The arguments of `classify`: the system, and how long and how exactly its motion is followed."""
 
     system: System
-    clock: System  # the same, with a forcing period
+    clock: System  # the same system, with a forcing period also under a constant load
     periods: int
     max_period: int
     seed: int
@@ -124,14 +124,14 @@ class VerdictRequest:
     progress: Progress
 
     def follow(self, states: np.ndarray, periods: int, kept: int, part: tuple[float, float]) -> Recurrence:
-        """How motions end from states (n, 2) within so many forcing periods; `part` of the work is this."""
+        """How motions from states (n, d) end within so many forcing periods; `part` is the share of the progress, from and to."""
         progress = part_of(self.progress, *part)
         return find_recurrence(
             self.clock, states, periods, max_period=self.max_period, kept=kept, tol=self.tol, progress=progress
         )
 
     def verdict(self, kind: AttractorKind, cause: Reason, ends: Recurrence, numbers: dict[str, Any], **more: Any) -> Verdict:
-        """A verdict on a motion that ended so, for a cause whose sentence has these numbers."""
+        """A verdict on a motion with these `ends`, for a cause whose sentence is filled with these numbers."""
         given = (
             dict.fromkeys(("period", "orbit", "exponents", "zero_one"))
             | {"state": start_at(self.system, ends.states[0, -1])}
@@ -146,7 +146,7 @@ class VerdictRequest:
 
 
 def settled(case: VerdictRequest, ends: Recurrence, start: np.ndarray) -> Verdict | None:
-    """The verdict on a motion from a state (2,) that has come to rest, ended or repeats itself; None where it goes on."""
+    """The verdict on a motion from a state (d,) that has come to rest, has ended or repeats itself; None if it goes on moving."""
     if ends.rest[0] or (ends.period[0] == 1 and stays_at_rest(case.clock, ends.last[0])):
         held, numbers = case.system.model.held, {"periods": round(float(ends.periods[0]))}
         point = ends.last[0] if held else np.array([float(case.system.model.contact), 0.0])
@@ -162,7 +162,7 @@ def settled(case: VerdictRequest, ends: Recurrence, start: np.ndarray) -> Verdic
 
 
 def _ended(case: VerdictRequest, ends: Recurrence, start: np.ndarray) -> Verdict:
-    """The verdict on a motion that ends, as `simulate` sees it."""
+    """The verdict on a motion that cannot be followed further; `simulate` gives the reason."""
     periods = round(float(ends.periods[0]))
     try:
         motion = simulate(case.clock, **start_at(case.system, start), periods=periods + 1, tol=case.tol, dense=False)
@@ -174,7 +174,7 @@ def _ended(case: VerdictRequest, ends: Recurrence, start: np.ndarray) -> Verdict
 
 
 def on_orbit(case: VerdictRequest, ends: Recurrence, found: Certificate, seen: str, **more: Any) -> Verdict:
-    """The verdict on a motion with an orbit under it, certified or not, of which so much has been seen."""
+    """The verdict on a motion near an orbit, which is certified or not; `seen` says what was seen of the motion."""
     more["evidence"] = more.get("evidence", {}) | found.evidence
     if found.orbit is None or not found.sound:
         return case.undecided(Reason.DOUBTFUL_ORBIT, ends, {"seen": seen, "doubt": found.doubt}, **more)

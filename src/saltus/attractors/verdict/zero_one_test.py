@@ -1,4 +1,4 @@
-"""The 0-1 test for chaos, a second opinion that knows nothing of derivatives."""
+"""The 0-1 test for chaos, a second opinion that needs no derivatives."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from saltus.checks import check_count
 from saltus.errors import ParameterError
 from saltus.public_functions import Numbers
 
-FEWEST_ENTRIES = 100  # of a series: lags reach a tenth of them
-CONSTANT = 1e-9  # relative: a series that varies less does not vary
+FEWEST_ENTRIES = 100  # the shortest series, as lags reach a tenth of it
+CONSTANT = 1e-9  # a series that varies by less than this, relatively, counts as constant
 
 
 @dataclass(frozen=True, slots=True)
 class ZeroOne:
-    """The outcome: near 0 for regular motion, near 1 for chaos.
+    """The outcome of the 0-1 test: K is near 0 for regular motion and near 1 for chaos.
 
     Attributes
     ----------
     K
-        The median over the frequencies.
+        The median of the correlations over the frequencies.
     spread
         Half the distance between their quartiles.
     samples
@@ -46,17 +46,17 @@ def zero_one_test(series: Numbers, *, seed: int = 0, count: int = 100) -> ZeroOn
     series, less the term E[phi]^2 (1 - cos n c) / (1 - cos c) that oscillates with n, is compared with n: K is their
     correlation, and the median over the frequencies is taken.
 
-    The series must be sampled coarsely, as once a forcing period: of a finely sampled one the test says 0 whatever it is. Weak
-    chaos takes long series, and a fine structure of many tori short of the noise is not resolved.
+    The series must be sampled coarsely, such as once in each forcing period: for a finely sampled series the test gives 0
+    whatever the motion is. Weak chaos takes long series, and the test does not resolve the fine structure of many tori.
 
     Parameters
     ----------
     series
         (samples,) numbers, at least 100.
     seed
-        Of the frequencies.
+        The seed of the frequencies.
     count
-        How many of them.
+        The number of frequencies.
 
     Raises
     ------

@@ -1,1 +1,1 @@
-"""The numbers and statements of the paper beside what is computed here."""
+"""The numbers and statements of the paper, and how they are judged by what is computed here."""

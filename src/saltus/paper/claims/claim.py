@@ -1,7 +1,7 @@
 """A claim: a number or statement of the paper, what a figure measured for it, and the verdict that follows.
 
-What the paper says stands in the tables beside this file (see `claim_tables`); a figure or section gives one `Measured` for each
-of its claims, and `judge` joins both. `ledger` counts the verdicts.
+The statements of the paper are in the tables beside this file (see `claim_tables`); a figure or section gives one `Measured` for
+each of its claims, and `judge` joins both. `ledger` counts the verdicts.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from saltus.paper.claims.claim_tables import BESIDE_TABLE, ClaimEntry, Origin, c
 
 
 class ClaimVerdict(StrEnum):
-    """What the computation says of a claim, the gravest last."""
+    """The verdict of the computation on a claim; the gravest one is the last."""
 
     HOLDS = "holds"  # a check of our own, which the paper does not state
     AS_PRINTED = "as printed"
     NOT_CHECKED = "not checked"  # with the reason
     CORRECTED = "corrected"  # it fails as printed, and holds as its erratum corrects it
-    UNDECIDED = "undecided"  # the numbers bear out neither, with the reason
-    DISAGREES = "disagrees"  # it fails, and no erratum of it holds
+    UNDECIDED = "undecided"  # the numbers decide nothing, with the reason
+    DISAGREES = "disagrees"  # it fails as printed, and there is no erratum that holds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,11 +43,11 @@ class Claim:
     evidence: str
     erratum: int | None = None
     headline: str = ""
-    table: tuple[tuple[str, ...], ...] = ()  # a part of the evidence, its first row the headings
-    beside_table: str = ""  # the evidence without what is in the table
+    table: tuple[tuple[str, ...], ...] = ()  # a part of the evidence; its first row are the headings
+    beside_table: str = ""  # the evidence without the part that is in the table
 
     def to_dict(self) -> dict[str, Any]:
-        """As written to claims.json."""
+        """The claim as it is written to claims.json."""
         return asdict(self)
 
     @classmethod
@@ -68,18 +68,18 @@ class Claim:
 class Measured:
     """What was computed for one claim.
 
-    A claim with a printed number has one `outcome`, the number found. For a formula or statement the outcome is a residual that
-    must vanish, or whether it holds, as printed and, where there is an erratum, as `corrected`. `second` is the same of the
-    correction by an independent kind of evidence. An outcome of None decides nothing.
+    For a claim with a printed number, `outcome` is the number found. For a formula or a statement as printed it is a residual
+    that must vanish, or whether it holds; `corrected` is the same for the claim as its erratum corrects it, and `second` the same
+    for the correction by an independent kind of evidence. An outcome of None decides nothing.
     """
 
     outcome: float | bool | None
     corrected: float | bool | None
     second: float | bool | None
-    fields: Mapping[str, Any]  # of the template of the evidence
+    fields: Mapping[str, Any]  # the fields of the evidence's template
 
 
-Measures = Mapping[str, Measured | None]  # by the claim's id; None where the data at hand cannot bear on it
+Measures = Mapping[str, Measured | None]  # by the claim's id; None if the data at hand say nothing about it
 
 
 def measured(
@@ -90,7 +90,7 @@ def measured(
 
 
 def with_fields(fields: Mapping[str, Any], measures: Mapping[str, Measured]) -> dict[str, Measured]:
-    """The measures with fields that all of their evidence may name."""
+    """The measures with further fields, which the templates of their evidence may name."""
     return {id: replace(one, fields={**fields, **one.fields}) for id, one in measures.items()}
 
 
@@ -140,7 +140,7 @@ def judge_claim(id: str, entry: ClaimEntry, measured: Measured) -> Claim:
 
 
 def _without_list(evidence: str) -> str:
-    """What refers to the table follows without the comma or colon that led to the list."""
+    """The evidence with the reference to the table, without the comma or colon that led to the list."""
     return re.sub(rf"[,:;]?( ?{re.escape(BESIDE_TABLE)})", r"\1", evidence)
 
 
@@ -162,7 +162,7 @@ def _row(id: str, entry: ClaimEntry, judged: tuple[str, str, ClaimVerdict], evid
 
 
 def with_summaries(claims: Iterable[Claim]) -> list[Claim]:
-    """The claims, and those that rest on them: a summary has the gravest verdict of what it sums up, once all that is judged."""
+    """The claims and the summaries that rest on them: a summary has the gravest verdict of its claims, once all are judged."""
     known = {claim.id: claim for claim in claims}
     entries = {id: entry for part in claim_tables().values() for id, entry in part.items() if entry.rests_on}
     ready = {id: entry for id, entry in entries.items() if all(other in known for other in entry.rests_on)}

@@ -1,4 +1,4 @@
-"""The tables of claims: what the paper says, as data, in one TOML file for each section and in the paper's order.
+"""The tables of claims: the paper's statements as data, in one TOML file for each section and in the paper's order.
 
 A file begins with the `section` of the paper, its number, and its `title`. A table `[part.claim-id]` holds, for the claim that
 the part (a figure, table or group of statements) bears on:
@@ -33,11 +33,11 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-BESIDE_TABLE = "(see the table)"  # stands for a list where the table is shown beside the evidence
+BESIDE_TABLE = "(see the table)"  # replaces a list in the evidence where the table is shown beside it
 
 
 class Origin(StrEnum):
-    """Who says what a claim states."""
+    """Who makes the statement of a claim."""
 
     PAPER = "paper"
     OURS = "ours"  # a check of our own, counted apart from the paper's claims
@@ -81,7 +81,7 @@ class ClaimEntry:
         return not (self.not_checked or self.rests_on)
 
     def filled(self, template: str, fields: Mapping[str, Any], beside_table: bool = False) -> str:
-        """A template, such as the evidence, with the fields put in; `beside_table` leaves out the lists that `table` has."""
+        """A template, such as the evidence, with the fields put in; with `beside_table` without the lists that `table` shows."""
         forms = {name: form for name, form in self.lists.items() if name in fields}
         texts = {name: self._listed(form, fields[name]) for name, form in forms.items()}
         if beside_table:
@@ -89,7 +89,7 @@ class ClaimEntry:
         return template.format(**{**fields, **texts})
 
     def table(self, fields: Mapping[str, Any]) -> list[list[str]]:
-        """The rows of the list that has columns, below their headings; nothing where no list has any."""
+        """The headings and rows of the list that has columns; nothing if no list has any."""
         for name, form in self.lists.items():
             if form.columns and name in fields:
                 return [list(form.columns), *([self.filled(cell, row) for cell in form.columns.values()] for row in fields[name])]
@@ -108,7 +108,7 @@ def claim_tables() -> dict[str, dict[str, ClaimEntry]]:
     TypeError
         A claim without a place or statement, or with an unknown key.
     ValueError
-        A source or listing that there is none of.
+        An origin or a list form that does not exist.
     """
     return _read()[1]
 

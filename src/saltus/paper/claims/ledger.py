@@ -23,8 +23,8 @@ class SectionCount:
     """The verdicts on one section, or on all of them."""
 
     name: str
-    paper: Counter[ClaimVerdict]  # of what the paper states
-    ours: Counter[ClaimVerdict]  # of our own checks
+    paper: Counter[ClaimVerdict]  # the verdicts on the paper's statements
+    ours: Counter[ClaimVerdict]  # the verdicts on our own checks
 
     def cells(self) -> tuple[str, ...]:
         """A row of the ledger's table, under `HEADINGS`."""
@@ -37,7 +37,7 @@ HEADINGS = ("section", "total", *map(str, PAPER_VERDICTS), "own checks")
 
 
 def ledger(claims: Iterable[Claim]) -> list[SectionCount]:
-    """One count for each section that claims are of, in the paper's order, and one of all."""
+    """One count for each section that has claims, in the paper's order, and one of all sections."""
     claims, titles = list(claims), section_titles()
     order = list(titles)
     sections = sorted({claim.section for claim in claims}, key=lambda s: order.index(s) if s in order else len(order))

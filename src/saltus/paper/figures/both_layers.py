@@ -1,4 +1,4 @@
-"""The paper's motions beside those of both layers: which stay, which move, which vanish when the closed layer may open."""
+"""The paper's motions compared with those of both layers: which stay, change or vanish when the closed layer may open."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from saltus.paper.figures.harmonic_loads import AMPLITUDE, FREQUENCY, under_forc
 from saltus.paper.figures.phase_portraits import constant_load
 from saltus.systems import NewtonImpact, System, TwoLayer
 
-# Of the full model: m, e of both layers, and the transfer g. With m = 0 and (e, g) = (0, 1) it has the paper's crossing. With
-# e > 0 the transfer changes no motion, as the other layer is open when one closes.
+# Variants of the full model: m, e of both layers, and the transfer g. With m = 0 and (e, g) = (0, 1) motions cross the contact as
+# in the paper. With e > 0 the transfer changes no motion, as the other layer is open when one closes.
 VARIANTS: tuple[tuple[float, float, float], ...] = (
     (0.0, 0.0, 1.0),
     *((m, e, g) for m in (0.001, 0.01) for e, g in ((0.0, 1.0), (0.0, 0.0), (0.5, 0.0))),
@@ -34,12 +34,12 @@ class BothLayersSettings:
 
     settling: int = 300  # Forcing periods in which motions settle on the reduced model's attractors: with C = 0.1 most do.
     following: int = 300  # Forcing periods for which the full motion from a reduced attractor's state is followed.
-    same: float = 1e-6  # The largest distance of the states at phase 0, over the amplitude, where both attractors are one.
-    near: float = 0.01  # The same where the attractor is hardly another: a mass m = 0.01 alone changes it by so much.
-    moved: float = 0.1  # The same where it is moved; what is farther away is another attractor.
+    same: float = 1e-6  # Attractors are the same up to this distance of their states at phase 0, relative to the amplitude.
+    near: float = 0.01  # Up to this distance they hardly differ: a mass m = 0.01 alone changes an attractor by so much.
+    moved: float = 0.1  # Up to this distance the attractor has moved; farther away it is another one.
     starts: tuple[tuple[float, float], ...] = ((0.05, 0.0), (0.6, 0.0), (1.5, 0.0), (2.2, 0.0), (-0.8, 0.0), (-2.0, 1.0))
-    portrait_mass: float = 0.001  # m of the motions beside Figs. 4 and 5: with m = 0 they stop where the hinge is singular.
-    settle_time: float = 400.0  # in which a damped motion comes to rest, C = 0.1.
+    portrait_mass: float = 0.001  # m of the motions compared with Figs. 4 and 5: with m = 0 they end where M is singular.
+    settle_time: float = 400.0  # The time in which damped motions come to rest, C = 0.1.
 
 
 SETTINGS = BothLayersSettings()
@@ -54,7 +54,8 @@ def full(system: System, mass: float, e: float, transfer: float) -> System:
 
 
 def embedded(states: np.ndarray) -> np.ndarray:
-    """States (n, 2) of the reduced model as those of both layers, (n, 4): one of them closed, by the sign of theta, or theta'."""
+    """States (n, 2) of the reduced model as states of both layers, (n, 4): the sign of theta (at 0 of theta') says which layer is
+    open."""
     theta, velocity = states.T
     lower = np.where(theta != 0.0, theta > 0.0, velocity > 0.0)
     return np.stack([theta * lower, theta * ~lower, velocity * lower, velocity * ~lower], axis=1)
@@ -75,7 +76,7 @@ def attractors(system: System, parameters: dict[str, np.ndarray]) -> tuple[dict[
 
 
 def fates(system: System, variant: tuple[float, float, float], parameters: dict[str, np.ndarray], one: Recurrence) -> Any:
-    """What becomes of the reduced attractors in the full model, (n,) of `FATES`, and its largest opening of the lower layer."""
+    """What becomes of the reduced attractors in the full model, (n,) of `FATES`, and the largest opening of the lower layer."""
     end = find_recurrence(
         full(system, *variant), embedded(one.last), SETTINGS.following, parameters=parameters, kept=16, extrema=True
     )
@@ -90,7 +91,7 @@ def fates(system: System, variant: tuple[float, float, float], parameters: dict[
 
 
 def _apart(one: Recurrence, states: np.ndarray) -> np.ndarray:
-    """How far states of both layers at phase 0 are from the nearest of a reduced attractor's, over its amplitude, (n,)."""
+    """The distances of states of both layers at phase 0 from the reduced attractors, over the amplitudes of these, (n,)."""
     amplitude = np.maximum(np.abs(one.highest), np.abs(one.lowest))
     apart = np.full(len(one), np.inf)
     for back in range(1, 1 + int(one.period.max(initial=0))):
@@ -157,7 +158,7 @@ def compute(size: int = 41) -> Any:
 
 
 def portraits() -> Any:
-    """The motions of Figs. 4 and 5 with both layers: for how long the reduced motion is theirs, and what they do at the end."""
+    """The motions of Figs. 4 and 5 with both layers: for how long they are the reduced motions, and where they end."""
     rows = []
     cases = [("fig04", fig04.systems(), fig04.STARTS, fig04.DURATIONS)]
     soft = {name: constant_load(stiffness=k) for name, k in fig05.STIFFNESS.items()}
@@ -186,7 +187,7 @@ def portraits() -> Any:
 
 
 def _one_portrait(system: System, start: tuple[float, float], duration: float) -> tuple[bool, float, float]:
-    """Whether the reduced motion is exact, when a closed layer is let go, and the share of the time with both layers open."""
+    """Whether the reduced motion is exact, when a closed layer is first released, and the share of the time with both open."""
     factor = float(system.get("impact.e"))
     x = embedded(np.array([start]))[0]
     state: dict[str, Any] = {"theta": (x[0], x[1]), "velocity": (x[2], x[3]), "duration": duration}
@@ -220,7 +221,7 @@ def stable_states() -> Any:
 
 
 def exact_below(data: Any, frequency: float) -> tuple[float, float]:
-    """The largest Hhat up to which all attractors of the map are exact at the frequency nearest to this one, and the next one."""
+    """The largest Hhat of the map up to which all attractors are exact, at the nearest frequency, and the next Hhat."""
     near = data[FREQUENCY].values[np.abs(data[FREQUENCY].values - frequency).argmin()]
     here = data[FREQUENCY].values == near
     amplitude, wrong = data[AMPLITUDE].values[here], data["fate"].values[0][here] != FATES.index("same")
@@ -242,7 +243,7 @@ def share_table(data: Any) -> list[list[str]]:
 
 
 def exact_portraits(data: Any) -> list[tuple[str, int, int]]:
-    """How many motions of each panel of Figs. 4 and 5 are those of both layers, with m = 0, and of how many."""
+    """For each panel of Figs. 4 and 5, how many motions both layers with m = 0 have in common with it, and how many there are."""
     panels = data["panel"].values.astype(str)
     found = {name: data["exact"].values[panels == name] for name in dict.fromkeys(panels)}
     return [(name.removeprefix("fig").lstrip("0"), int(exact.sum()), exact.size) for name, exact in found.items()]

@@ -1,4 +1,4 @@
-"""The picture of the reduced model beside both layers: spectra, a diagram, what becomes of motions, and where nothing changes."""
+"""The figure that compares the reduced model with both layers: spectra, a diagram, fates of attractors, where it is exact."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What Figs. 14 and 15 share: a panel is a stability chart with its exact and quasi-static borders, and what disagrees."""
+"""The panels of Figs. 14 and 15: a stability chart with its exact and quasi-static borders, and their disagreements."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CHART_WINDOW = ((-2.0, 2.0), (-2.0, 2.0))  # of the initial states
 LOWEST_LOAD = -2.0  # V
 CLOSED_FORM_FROM = 2.0  # Omega from which the closed form of the onset is drawn too
 CHECKED = 100  # cells of a chart that are computed again, with more starts on a finer grid
-CURVES = 8  # largest number of curves on which motions end, for one chart: more would bury the border beside rest
+CURVES = 8  # largest number of curves on which motions end, for one chart: more would hide the border of rest
 
 
 def chart_figure(

@@ -22,7 +22,9 @@ class ClosedLayerSettings:
 
     motions: int = 12  # The number of stable motions of a diagram, spread evenly over its branches' points.
     instants: int = 4000  # The number of instants of an orbit's period at which the reaction is evaluated.
-    beside: float = 1e-9  # And as long after the beginning and before the end of each arc, where it is often least, as a share.
+    # The reaction is also evaluated this share of the orbit's duration after the beginning and before the end of each arc, where
+    # it is often least.
+    beside: float = 1e-9
 
 
 SETTINGS = ClosedLayerSettings()
@@ -31,9 +33,8 @@ SETTINGS = ClosedLayerSettings()
 def closed_layer(spectrum: Any) -> Any:
     """The least reaction of the closed layer in some stable motions, with the sign that keeps it closed (errata 21).
 
-    Returns a Dataset over `motion`: the value of the `parameter`, `stored`, the margin that the branch holds, `simulated`, the
-    least of -R2 or R1 of `eomnl`, both rows of which are evaluated along the simulated motion, and `share`, the share of the
-    motion's time in which it is below 0.
+    Returns a Dataset over `motion`: `parameter`, its value; `stored`, the margin in the branch's data; `simulated`, the least of
+    -R2 or R1 of `eomnl`, evaluated along the simulated motion; `share`, the share of the time in which the reaction is below 0.
     """
     stable = [
         (branch, i)
@@ -70,7 +71,7 @@ class _Reaction:
 
     @property
     def least(self) -> float:
-        """Its least value: of all arcs, their ends among them, between neighbouring instants by minimisation."""
+        """Its least value on all arcs, including their ends; between instants it is found by minimisation."""
         from scipy.optimize import minimize_scalar
 
         motion, duration = self.motion, self.orbit.duration

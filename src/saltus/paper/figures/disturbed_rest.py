@@ -1,4 +1,4 @@
-"""What becomes of a slight disturbance of theta = 0, by DOP853 from impact to impact: nothing here is of `flow`."""
+"""What becomes of a slight disturbance of theta = 0, integrated by DOP853 from impact to impact, independently of `flow`."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ import numpy as np
 class DisturbanceSettings:
     """How the disturbed state is followed."""
 
-    theta: float = 1e-5  # The rotation, in rad, from which it starts at rest.
-    tolerance: float = 1e-12  # Of DOP853, relative and absolute.
-    impacts: int = 20_000  # The largest number of impacts that are followed; a held motion has some 400 in a period.
+    theta: float = 1e-5  # The rotation, in rad, from which the motion starts at rest.
+    tolerance: float = 1e-12  # The relative and absolute tolerance of DOP853.
+    impacts: int = 20_000  # The largest number of impacts; a motion that stays near theta = 0 has some 400 in a period.
 
 
 SETTINGS = DisturbanceSettings()

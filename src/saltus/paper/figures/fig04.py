@@ -54,7 +54,7 @@ def _corner_error(group: Any) -> float:
 
 
 def measure(data: Any) -> dict[str, Measured]:
-    """The fixed points, and what the text says of each panel."""
+    """The fixed points, and the statements of the text on each panel."""
     a, b, c = data["a"], data["b"], data["c"]
     stable = a["equilibrium"].values[a["stable"].values.astype(bool)]
     rounds_a, wrong = [len(r) for r in circled(a)], a["wrong_reaction"].values

@@ -22,7 +22,7 @@ MOTION_DURATION = 40.0
 
 
 def compute(samples: int = 1200) -> Any:
-    """Both portraits; k = 1 for comparison of its separatrix."""
+    """Both portraits, and one with k = 1 to compare its separatrix."""
     groups = {
         name: portrait(constant_load(stiffness=k), STARTS[name], MOTION_DURATION, 4.0, samples) for name, k in STIFFNESS.items()
     }
@@ -80,7 +80,7 @@ def measure(data: Any) -> dict[str, Measured]:
 
 
 def _loop_shift(panel: Any, other: Any, side: int) -> float:
-    """The largest distance between the separatrices round the deformed equilibria on a side, and of these equilibria."""
+    """The largest distance between the separatrices round the deformed equilibria on a side, or between these equilibria."""
     ends = [float((side * p["equilibrium"]).max()) for p in (panel, other)]
     loops = [next(curve for curve in outward(p) if side * curve[0, 0] > 0) for p in (panel, other)]
     count = min(len(loop) for loop in loops)

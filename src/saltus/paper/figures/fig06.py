@@ -130,7 +130,7 @@ def measure(data: Any) -> dict[str, Measured]:
 
 
 def _extremes(data: Any) -> dict[str, Measured]:
-    """The limits of k and m, each by how far simulated motions near it are from its asymptote."""
+    """The limits of large and small k and m, by the distance of simulated motions from each asymptote."""
     hard, heavy, kept = data["extreme_stiffness"], data["extreme_mass"], data["extreme_mass_energy"]
     k, m = hard["stiffness_ratio"].values, heavy["mass_ratio"].values
     upper, lower = hard["period"].values - hard["other_half"].values, hard["other_half"].values  # the start is above

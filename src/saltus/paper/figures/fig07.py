@@ -127,7 +127,7 @@ def _disturbed() -> Any:
 
 
 def _balance(stiffness: float = 5.0, vertical: float = -0.5, theta0: float = np.deg2rad(-10.0)) -> Any:
-    """Both peaks of one simulated motion from either side, for the balance as printed and as corrected; the reciprocity."""
+    """Both peaks of one simulated motion started on either side, for the balance as printed and corrected; the reciprocity."""
     reference = system(stiffness, vertical)
     twin, start = reciprocal(reference, theta0)
     values = {

@@ -83,7 +83,7 @@ def _paths(beta0: float, loads: tuple[tuple[float, float, float], ...], what: st
 
 
 def _held(system: str) -> bool:
-    """Whether a motion from rest at theta = 0 rests through two periods of the loads of the path."""
+    """Whether a motion from rest at theta = 0 stays at rest for two periods of the loads of the path."""
     motion = simulate(System.from_json(system), theta=0.0, velocity=0.0, periods=2)
     return motion.stop is Stop.REST and len(motion.impacts) == 0
 
@@ -174,7 +174,8 @@ def measure(data: Any) -> dict[str, Measured]:
 
 
 def _borne_out(paths: Any) -> bool:
-    """Whether rest is held just on the paths within the printed border, and nothing deformed exists just in the true domain."""
+    """Whether motions stay at rest on exactly the paths within the printed border, and deformed equilibria are absent on exactly
+    the paths within the true domain."""
     held = (paths["held"].values.astype(bool) == paths["within_printed"].values.astype(bool)).all()
     return bool(held and ((paths["deformed"].values == 0) == paths["within"].values.astype(bool)).all())
 

@@ -23,7 +23,7 @@ from saltus.plots import DOUBLE_COLUMN, draw_beside, highest, new_figure, respon
 
 AMPLITUDES = {"a": 0.25, "b": 0.5}  # zetahat
 FREQUENCY_RANGE = (0.1, 4.0)  # Omega: up to chaos
-MOTIONS, HORIZONS = 96, (500, 2000, 8000)  # for how many forcing periods wandering motions are followed
+MOTIONS, HORIZONS = 96, (500, 2000, 8000)  # number of motions, and forcing periods after which settled ones are counted
 
 
 def panels(amplitudes: Mapping[str, float] = AMPLITUDES, **options: Any) -> Panels:
@@ -60,7 +60,7 @@ def transients() -> Any:
 
 @styled
 def draw(data: Any) -> Any:
-    """(a) and (b), a row for each amplitude; beside it what lies between rest and the steady motions of the main branch."""
+    """(a) and (b), a row for each amplitude; beside each the motions between rest and the main branch."""
     panels = {name: tree for name, tree in data.children.items() if name in AMPLITUDES}
     figure = new_figure(DOUBLE_COLUMN, 25.0 + 70.0 * len(panels))
     axes = figure.subplots(len(panels), 2, squeeze=False, width_ratios=[2.6, 1])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from saltus.paper.figures.load_diagrams import force_figure
 from saltus.paper.measures import chaos_measures
 
-# Omega of each panel, and Hhat beyond the second region of chaos, or what is left of it.
+# Omega of each panel, and a Hhat beyond the second region of chaos, or beyond the rest of it.
 FREQUENCIES = {"a": 0.5, "b": 1.0}
 LARGEST = {0.5: 4.0, 1.0: 4.0}
 

@@ -47,7 +47,7 @@ def compute(**options: Any) -> Any:
 
 
 def _disturbed(critical: float) -> Any:
-    """How far a slightly disturbed theta = 0 moves in a period on both sides of Hcr, and below the printed one (errata 35)."""
+    """How far the slightly disturbed theta = 0 moves in a period on both sides of Hcr, and below the printed Hcr (errata 35)."""
     beta0 = math.radians(BETA0)
     printed = float(critical_horizontal(beta0, VERTICAL))
     amplitudes = np.array([(1 - BESIDE) * critical, (1 + BESIDE) * critical, (1 - BESIDE) * printed])
@@ -60,7 +60,7 @@ def _disturbed(critical: float) -> Any:
 
 
 def _mirror_images() -> Any:
-    """The distance of a motion from the mirror image of the one that starts mirrored half a period later."""
+    """The distance of a motion from the mirror image of another one, which starts from the mirrored state half a period later."""
     systems = {
         "(i)": under_force(amplitude=0.3),
         "(ii)": on_ground(amplitude=0.3),
@@ -82,7 +82,7 @@ def _gap(system: Any) -> float:
 
 @styled
 def draw(data: Any) -> Any:
-    """(a) the largest and (b) the least rotation of every motion; beside them what happens near rest."""
+    """(a) the largest and (b) the least rotation of every motion; beside each the details near rest."""
     tree = data["a"]
     _, high = tree.attrs["bounds"]
     figure = new_figure(DOUBLE_COLUMN, 150.0)
@@ -112,7 +112,7 @@ def _range(tree: Any, high: float, quantity: str) -> tuple[float, float]:
 
 
 def measure(data: Any) -> dict[str, Measured]:
-    """The loss of symmetry, and what else the text says."""
+    """The loss of symmetry, and the other statements of the text."""
     found = {**both_diagram(data["a"], data["mirror"]), "fig13-critical": border_of_rest(data)}
     return {**found, "fig13-validity": validity("Fig. 13", {"a": data["a"]})}
 

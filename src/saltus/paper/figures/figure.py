@@ -1,4 +1,4 @@
-"""What a part of the paper is: a computation, a picture drawn from its dataset, and what is measured for its claims."""
+"""A part of the paper: a computation, a picture drawn from its dataset, and the measures for its claims."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from saltus.paper.toml_tables import toml_table
 class PaperFigure:
     """One figure, table or group of statements of the paper, which `reproduce` makes by its name.
 
-    1. `panels(**parameters)` returns a function without arguments for each panel, and `join` makes of what they return by the
-       panels' names an xarray DataTree: every number behind the picture, with units;
+    1. `panels(**parameters)` returns a function without arguments for each panel, and `join` makes an xarray DataTree of their
+       results by the panels' names: every number behind the picture, with units;
     2. `draw(data)` returns a matplotlib Figure from nothing but that data, or is None where there is nothing to draw;
     3. `measure(data)` returns the numbers for its claims, again from nothing but the data; the tables of claims hold the rest;
     4. `table(data)`, where given, returns Markdown.
@@ -27,14 +27,14 @@ class PaperFigure:
     name: str
     title: str
     caption: str
-    section: str = ""  # its number in the paper; none where the statements are of several sections
+    section: str = ""  # its number in the paper; empty if the statements belong to several sections
     panels: Callable[..., Panels]
     join: Callable[[dict[str, Any]], Any]
     measure: Callable[[Any], Measures] = lambda data: {}
     draw: Callable[[Any], Any] | None = None
     table: Callable[[Any], str] | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
-    module: str  # that computes it
+    module: str  # the module that computes it
 
     def compute(self, **parameters: Any) -> Any:
         """The data of all panels together, for parameters that need not be the paper's."""

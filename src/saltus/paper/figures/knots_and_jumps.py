@@ -21,10 +21,10 @@ class KnotSettings:
 
     phases: int = 361  # The number of phases of a forcing period at which motions are given.
     beyond: float = 3e-3  # The relative distance past a fold at which motions start: nearer to it they linger at the lost orbit.
-    apart: float = 1e-5  # A point of a branch that is nearer to a fold, relative, may be the fold itself.
-    distinct: float = 1e-6  # Motions that differ by less, in rad, are one motion from two points.
+    apart: float = 1e-5  # A point of a branch within this relative distance of a fold may be the fold itself.
+    distinct: float = 1e-6  # Motions that differ by less, in rad, are one motion that was reached from two points.
     settle: int = 800  # The number of forcing periods for which a motion past a fold is followed.
-    last: int = 12  # The number of last ones of these, from which its extrema are taken.
+    last: int = 12  # The number of the last of these periods from which its extrema are taken.
 
 
 SETTINGS = KnotSettings()
@@ -153,7 +153,7 @@ def jumps(spectrum: Any) -> Any:
 
 
 def birth(spectrum: Any) -> Any:
-    """Where the main branch begins: the largest abs(theta) of its orbit at the first fold, and of its motion just below it."""
+    """The beginning of the main branch: the largest abs(theta) of its orbit at the first fold, and of the motion below it."""
     system, branch = System.from_json(str(spectrum.attrs["system"])), main_branch(spectrum)
     fold, size = first_fold(branch)
     orbit, _ = _last_stable(branch, fold) if np.isfinite(fold) else (None, 0.0)
@@ -176,7 +176,7 @@ def _settled(system: Any, path: str, values: np.ndarray, orbits: list[Any]) -> n
 
 
 def _last_stable(branch: Any, fold: float) -> tuple[Any, float]:
-    """The stable orbit nearest to a fold, but not at it, and the sign of the way on which there is none."""
+    """The stable orbit nearest to a fold, but not at it, and the sign of the direction in which there is none beyond the fold."""
     x = branch["parameter"].values
     stable = np.flatnonzero(branch["stable"].values & (np.abs(x - fold) > SETTINGS.apart * abs(fold)))
     if not stable.size:

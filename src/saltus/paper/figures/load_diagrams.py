@@ -1,4 +1,4 @@
-"""What Figs. 11 to 13 share: bifurcation diagrams over the amplitude of the horizontal load, and what becomes of rest."""
+"""The panels of Figs. 11 to 13: bifurcation diagrams over the amplitude of the horizontal load, and what becomes of rest."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def force_figure(
 ) -> PaperFigure:
     """A figure with a diagram under load (i) for each frequency Omega, up to the amplitude for it; `chaos` measures its bands.
 
-    Beside each panel stands what happens up to the amplitude `zoomed`, about Hcr. Options of its panels are those of
+    Beside each panel is its part up to the amplitude `zoomed`, about Hcr. Options of the panels are those of
     `bifurcation_diagram`.
     """
 
@@ -79,7 +79,7 @@ def _panel(frequency: float, largest: float, **options: Any) -> Any:
 
 
 def undeformed(system: Any, critical: float) -> Any:
-    """Started at rest in theta = 0 just below and just above Hcr: whether it stays there, and how far it moves much later."""
+    """Motions from rest at theta = 0 just below and just above Hcr: whether they stay there, and how far they move much later."""
     amplitudes = critical * np.array([1 - NEAR, 1 + NEAR])
     ends = simulate_many(system, theta=0.0, parameters={AMPLITUDE: amplitudes}, periods=WAIT, sample=("extrema",), last=LAST)
     moved = np.maximum(ends["overall_largest_theta"].values, -ends["overall_smallest_theta"].values)
@@ -89,7 +89,7 @@ def undeformed(system: Any, critical: float) -> Any:
 
 @styled
 def _draw(data: Any, frequencies: Mapping[str, float], zoomed: float) -> Any:
-    """A row for each frequency; beside it what happens up to the amplitude `zoomed`, about Hcr."""
+    """A row for each frequency; beside each panel its part up to the amplitude `zoomed`, about Hcr."""
     panels = {name: tree for name, tree in data.children.items() if name in frequencies}
     figure = new_figure(DOUBLE_COLUMN, 25.0 + 75.0 * len(panels))
     axes = figure.subplots(len(panels), 2, squeeze=False, width_ratios=[2.6, 1])

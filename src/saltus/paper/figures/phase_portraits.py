@@ -1,4 +1,4 @@
-"""The phase portraits of Figs. 1c, 4 and 5: a portrait of `saltus.studies` with energies and what its motions do."""
+"""The phase portraits of Figs. 1c, 4 and 5: a portrait of `saltus.studies` with energies and measures of its motions."""
 
 from __future__ import annotations
 
@@ -62,9 +62,9 @@ def _within(plane: Any, bound: float) -> Any:
 
 
 def _separates(plane: Any, system: System) -> Any:
-    """Whether motions on both sides of each separatrix end apart: it is closed, or the damping makes it a border.
+    """Whether motions on the two sides of each separatrix end differently: it is closed, or there is viscous damping.
 
-    Where impacts alone take energy, an open branch separates nothing: the motions on both its sides pass the saddle and end at
+    If energy is lost at impacts only, an open branch separates nothing: motions on both sides pass the saddle and end at
     theta = 0, one turn apart.
     """
     damped = float(system.get("model.damping")) > 0
@@ -102,7 +102,7 @@ def circled(data: Any) -> list[list[float]]:
 
 
 def outward(data: Any) -> list[np.ndarray]:
-    """The states (n, 2) of the separatrices that leave their saddle away from theta = 0, and so never touch it."""
+    """The states (n, 2) of the separatrices that leave their saddle away from theta = 0, and so never reach theta = 0."""
     curves = np.stack([data["separatrix_theta"].values, data["separatrix_velocity"].values], axis=2)
     known = [curve[np.isfinite(curve).all(axis=1)] for curve in curves]
     return [curve for curve in known if np.abs(curve[:, 0]).min() > 0.5 * abs(curve[0, 0])]

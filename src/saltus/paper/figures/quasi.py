@@ -68,7 +68,7 @@ def _stroboscopic_states(ax: Any, tree: Any) -> None:
 
 
 def _exponents(ax: Any, tree: Any) -> None:
-    """Chaos in blue, what is left undecided open in red; motions that have settled have no point."""
+    """Chaos in blue, undecided motions as open red marks; settled motions have no mark."""
     draw_bands(ax, tree)
     ax.axhline(0.0, color=FAINT, lw=0.6, zorder=1)
     table = tree["exponents"]

@@ -13,7 +13,7 @@ from saltus.studies import bifurcation_diagram, response_spectrum
 from saltus.systems import System
 from saltus.theory import critical_horizontal, equivalent_angle, static_angle
 
-# Of the states from which motions are searched: large motions attract little of what starts nearer to rest.
+# The window of the states from which motions are searched: few starts nearer to rest lead to large motions.
 WINDOW = ((-4.0, 4.0), (-4.0, 4.0))
 
 

@@ -1,4 +1,4 @@
-"""The smoothed sign of the paper beside the exact equation: its branches and special points, its error and its work over B."""
+"""The paper's smoothed sign compared with the exact equation: branches and special points, errors and work over B."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ FEATURES = {  # kind and frequency near which a special point is looked for, and
     "fold beside the upper grazing": ("LP", 0.28467, 1e-4),
     "fold beside the lower grazing": ("LP", 0.268495, 2e-5),
 }
-KNOT = (0.8486, 0.8492)  # Omega between which the amplitude curve crosses itself
+KNOT = (0.8486, 0.8492)  # the values of Omega between which the amplitude curve crosses itself
 CONFIRMED = 1e-3  # rad by which the amplitudes of a confirmed motion may differ
 LONGEST_STEP = 1e-4  # the paper's Maximum Time Step
 ENOUGH = 400.0  # B from which all stable motions must be confirmed
@@ -35,11 +35,11 @@ ENOUGH = 400.0  # B from which all stable motions must be confirmed
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorkSettings:
-    """The motion on which the work of an integrator is counted, and how."""
+    """The motion for which the work of an integrator is counted, and the values over which it is."""
 
     periods: int = 20  # The number of forcing periods: enough impacts for their number not to matter.
     start: float = 0.3  # The angle in rad from which the motion starts at rest.
-    sharpness: tuple[float, ...] = (50.0, 200.0, 1e3, 5e3, 2e4)  # The values of B, to where 1/B is below the errors shown.
+    sharpness: tuple[float, ...] = (50.0, 200.0, 1e3, 5e3, 2e4)  # The values of B, up to where 1/B is below the errors shown.
     tolerances: tuple[float, ...] = (1e-4, 1e-6, 1e-8, 1e-10)  # The tolerances of the integrator, from rough to near its best.
 
 
@@ -76,7 +76,7 @@ def _broken(branch: Any) -> Any:
 
 
 def _features(branches: dict[float | None, Any]) -> Any:
-    """Where each special point and the knot lie, and the amplitude at `REGULAR`, by B; inf for the exact equation."""
+    """The places of the special points and of the knot, and the amplitude at `REGULAR`, by B; B = inf is the exact equation."""
     every = list(branches.values())
     place = np.array([[_nearest(branch, *feature) for feature in FEATURES.values()] for branch in every])
     return dataset(
@@ -103,7 +103,7 @@ def _nearest(branch: Any, kind: str, place: float, within: float) -> float:
 
 
 def _knot(branch: Any) -> float:
-    """Where two stable orbits of the branch have one amplitude."""
+    """The frequency at which two stable orbits of the branch have the same amplitude."""
     from scipy.optimize import brentq
 
     def difference(frequency: float) -> float:
@@ -114,7 +114,8 @@ def _knot(branch: Any) -> float:
 
 
 def _confirmed(branches: dict[float | None, Any], count: int) -> Any:
-    """Each smoothed branch's stable orbits at `count` frequencies, and on what the exact motions from their states settle."""
+    """The stable orbits of each smoothed branch at `count` frequencies, and the amplitudes on which exact motions from their
+    states settle."""
     frequencies = np.linspace(*BOUNDS, count)[1:-1]
     rows = [
         (b, w, orbit.amplitude, *map(float, orbit.state))
@@ -184,7 +185,7 @@ def _integrated(sharpness: float, rtol: float) -> tuple[int, float, float]:
 
 
 def measure(data: Any) -> dict[str, Measured]:
-    """What the paper says of the smoothing, and what it changes."""
+    """The paper's statements on the smoothing, and the changes that it makes."""
     found = {**_accuracy(data["features"], data["confirmed"]), **_kinds(data), **_cost(data["work"])}
     return found | {"abstract-branch-point": _branch_point(data["exact"], data["broken"])}
 
@@ -255,7 +256,7 @@ def _kinds(data: Any) -> dict[str, Measured]:
 
 
 def _cost(work: Any) -> dict[str, Measured]:
-    """The evaluations that each way needs for an error of 1e-8 and what the paper's longest step would take."""
+    """The evaluations for an error of 1e-8, smoothed and from impact to impact, and those that the paper's longest step takes."""
     exact, smoothed = (_needed(work, b, 1e-7) for b in (math.inf, 5000.0))
     steps = float(work.attrs["duration"]) / LONGEST_STEP
     numbers = {"exact": exact, "smoothed": smoothed, "ratio": smoothed / exact, "paper": 6 * steps, "step": LONGEST_STEP}

@@ -65,7 +65,7 @@ def _draw_branch(ax: Any, branch: Any, look: dict[str, Any], label: str | None) 
 
 
 def _draw_settled(ax: Any, confirmed: Any) -> None:
-    """On what exact motions from the states of smoothed orbits settle, as dots."""
+    """The amplitudes on which exact motions from the states of smoothed orbits settle, as dots."""
     here = confirmed["sharpness"].values == SHOWN[0]
     ax.plot(
         confirmed["frequency"].values[here], confirmed["settled"].values[here],

@@ -74,7 +74,7 @@ def _example(model: Any, theta_2: float, before: tuple[float, float], after_1: f
 
 
 def _random_impacts(model: Any, rng: np.random.Generator, impacts: int = 300) -> Any:
-    """How many random impacts on either layer are named otherwise than `impact_condition1` to `impact_condition3` say.
+    """How many random impacts on either layer get another name than by `impact_condition1` to `impact_condition3`.
 
     The conditions are those of the text, on the velocities of the hit and of the other layer; which layers are deformed
     afterwards follows from a short motion with the velocities after the impact.

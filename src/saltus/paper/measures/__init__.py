@@ -1,1 +1,1 @@
-"""Numbers read off the data of Figs. 9 to 15, for their claims."""
+"""Measures for the claims of Figs. 9 to 15, computed from the data of the figures."""

@@ -1,6 +1,6 @@
-"""What section 6 says of chaotic and quasi-periodic motions in Figs. 9 to 13, measured by the bands of their diagrams.
+"""Measures for the statements of section 6 on chaotic and quasi-periodic motions in Figs. 9 to 13, from the bands of chaos.
 
-The panels of a figure are given by the value in which they differ, in rising order.
+The panels of a figure are given in a mapping by the value in which they differ, in rising order.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from saltus.systems import System
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChaosCriteria:
-    """By which numbers the statements on chaos in Figs. 9 to 13 are judged."""
+    """The numbers by which the statements on chaos in Figs. 9 to 13 are judged."""
 
     inner: int = 200  # The number of values within a band at which stable motions are counted.
     high: float = 1.0  # Frequencies above this one are beyond the primary resonance.
     resonant: tuple[float, float] = (1.0, 2.0)  # The frequencies at which the paper sees chaos in Fig. 9, approximately.
-    collisions: float = 0.5  # Chaos is a matter of collisions if these are at more than this share of the edges that are known.
+    collisions: float = 0.5  # Chaos arises by collisions if they occur at more than this share of the edges of a known kind.
     apart: float = 0.05  # Bands whose gap is a larger share of the range are in different regions of chaos.
     large_motion: float = 0.5  # Motions of more than this share of the largest stable amplitude of a diagram are large.
     low: float = 0.5  # Superharmonic resonances are below this frequency.
@@ -50,7 +50,7 @@ def _width(spectrum: Any) -> float:
 
 
 def _quasi_periodic(spectrum: Any, below: float) -> Measured:
-    """Erratum 22: no tori; what is there instead is chaos, at frequencies below a given one."""
+    """Erratum 22: there are no tori but chaos, at frequencies below a given one."""
     reason, bands = excludes_tori(System.from_json(str(spectrum.attrs["system"]))), bands_of(spectrum)
     chaos = any(band["high"] < below for band in bands)
     return measured(reason is None, reason is not None and chaos, reason=reason, bands=bands)
@@ -91,10 +91,11 @@ def _around_resonance(panels: Panels) -> Measured:
 
 
 def _collision(panels: Panels) -> Measured:
-    """Whether at most edges of bands about the resonance, of which it is known what happens there, motions collide: a stable
-    orbit with an unstable one at a fold, or the chaotic attractor with an unstable orbit at a crisis.
+    """Whether motions collide at most of the bands' edges about the resonance whose kind is known: a stable orbit with an
+    unstable one at a fold, or the chaotic attractor with an unstable orbit at a crisis.
 
-    Narrow windows are met by chance, so the edges are a sample: the 95 % interval of the share decides, where it can.
+    Narrow windows are found by chance, so the edges are a sample: the 95 % interval of the share decides, unless it contains the
+    limit.
     """
     rows = []
     for load, tree in panels.items():
@@ -137,14 +138,14 @@ def ground_spectra(panels: Panels, transients: Any) -> dict[str, Measured]:
 
 
 def _wandering(spectrum: Any) -> np.ndarray:
-    """The values of the grid at which motions wander with a positive exponent: chaos, lasting or not."""
+    """The values of the grid with unsettled motions of positive exponent: chaos or chaotic transients."""
     table = spectrum["exponents"]
     positive = table["exponent"].values - table["error"].values > 0.0
     return np.asarray(table["value"].values[positive])
 
 
 def _at_high_frequency(panels: Panels, transients: Any) -> Measured:
-    """As printed: what wanders there is chaos that lasts, the more the larger the load. Erratum 31: most of it is a transient."""
+    """As printed: the unsettled motions there are chaotic, the more the larger the load. Erratum 31: most are transients."""
     seen = [_wandering(tree) for tree in panels.values()]
     seen = [values[values > CRITERIA.high] for values in seen]
     bands = [[band for band in bands_of(tree) if band["low"] > CRITERIA.high] for tree in panels.values()]
@@ -230,7 +231,7 @@ def _regions(spectrum: Any) -> list[dict[str, float]]:
 
 
 def _large_between(spectrum: Any, low: float, high: float) -> bool:
-    """Whether over most of a range a stable motion is there, and a large one in its middle."""
+    """Whether there is a stable motion over most of a range, and a large one in its middle."""
     branches = [branch for _, branch in branches_of(spectrum)]
     middle = np.concatenate([amplitudes_at(branch, (low + high) / 2, stable=True) for branch in branches])
     largest = max(float(np.max(branch["amplitude"].values[branch["stable"].values == 1], initial=0.0)) for branch in branches)
@@ -239,7 +240,7 @@ def _large_between(spectrum: Any, low: float, high: float) -> bool:
 
 
 def shifts(panels: Panels) -> Measured | None:
-    """Where chaos that lasts begins, over the frequencies; undecided where there is none. None where there is one frequency."""
+    """The loads at which chaos begins, over the frequencies; undecided if there is none. None for a single frequency."""
     if len(panels) < 2:
         return None
     least = {frequency: min((band["low"] for band in bands_of(tree)), default=np.inf) for frequency, tree in panels.items()}

@@ -1,4 +1,4 @@
-"""What a panel of Figs. 14 and 15 amounts to in numbers: areas of the plane of the loads, and the onset of motions along V."""
+"""The panels of Figs. 14 and 15 in numbers: areas of the plane of the loads, and the onset of motions over V."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class ChartCells:
     horizontal: np.ndarray
     vertical: np.ndarray
     amplitude: np.ndarray
-    count: np.ndarray  # of the motions beside rest
+    count: np.ndarray  # the number of motions beside rest
     static: np.ndarray  # whether rest is the only equilibrium of the quasi-static loads
     only_rest: np.ndarray  # whether every motion came to rest
     motion_period: np.ndarray  # (vertical, horizontal, motion)
@@ -56,13 +56,13 @@ def lost(panel: Any) -> float:
 
 
 def gained(panel: Any) -> float:
-    """The cells outside of that domain in which nothing but rest is left, as a share of the domain."""
+    """The cells outside the quasi-static monostable domain in which there is rest alone, as a share of the domain."""
     cells = chart_cells(panel)
     return float((~cells.static & cells.only_rest).sum() / max(cells.static.sum(), 1))
 
 
 def outside(panel: Any) -> float:
-    """The same cells as a share of the cells outside of the domain."""
+    """The cells outside the domain in which there is rest alone, as a share of the cells outside the domain."""
     cells = chart_cells(panel)
     return float((~cells.static & cells.only_rest).sum() / max((~cells.static).sum(), 1))
 
@@ -92,7 +92,7 @@ def _least_at(curve: Any, vertical: np.ndarray) -> np.ndarray:
 def lost_by_curves(panel: Any) -> float:
     """The share `lost`, from the exact curves: the area between the onset of the first motion and the static border.
 
-    NaN where that onset is not followed all along, or is no border of its own.
+    NaN if the curve of the onset does not extend over all V, or is no border of rest.
     """
     static = panel["static"].to_dataset()
     inside = (static["vertical"].values < 0) & (static["true"].values > 0)

@@ -1,6 +1,6 @@
-"""What the text says of Figs. 14 and 15, measured: each trend answered by a number.
+"""Measures for the statements of the text on Figs. 14 and 15, a number for each trend.
 
-The panels of a figure are given by the value in which they differ, in rising order.
+The panels of a figure are given in a mapping by the value in which they differ, in rising order.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ Panels = Mapping[float, Any]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChartCriteria:
-    """By which numbers the statements on Figs. 14 and 15 are judged."""
+    """The numbers by which the statements on Figs. 14 and 15 are judged."""
 
     primary: tuple[float, float] = (0.75, 1.0)  # Between these frequencies of Fig. 14 amplitudes are largest on average.
-    most: float = 0.9  # What is said of the motions of a chart holds, as printed, in at least this share of the cells.
+    most: float = 0.9  # A statement on the motions of a chart holds, as printed, if it does in at least this share of the cells.
     slow: float = 0.25  # Below this Omega, far below resonance, motions follow the loads and nothing is anticipated.
     narrow: float = 0.15  # A region is narrow below this share of the quasi-static domain.
-    few: float = 0.02  # Of at most this share of the changes it is not known what becomes of the motion.
-    apart: float = 0.1  # At most this share of the ends that were solved for lie outside of where simulation has enclosed them.
-    wrong: float = 0.05  # At most this share of the cells is wrong, with the upper end of its 95 % interval.
+    few: float = 0.02  # For at most this share of the changes may it be unknown what becomes of the motion.
+    apart: float = 0.1  # At most this share of the ends that were solved for may lie outside of their enclosures by simulation.
+    wrong: float = 0.05  # The upper end of the 95 % interval of the share of wrong cells must be below this.
     slight: float = 0.15  # Relative differences below this are slight.
 
 
 CRITERIA = ChartCriteria()
 ROWS = np.linspace(-1.2, -0.2, 41)  # V at which the onset is compared
-REFERENCE_V = np.array([-0.5])  # at which the onset is named
+REFERENCE_V = np.array([-0.5])  # V at which the onset is given in the evidence
 
 
 def over_frequency(data: Any) -> dict[str, Measured]:
@@ -56,7 +56,8 @@ def over_frequency(data: Any) -> dict[str, Measured]:
 
 
 def _anticipates(panels: Panels) -> Measured:
-    """As printed: at every frequency. Erratum 34: not far below resonance, where cells with nothing but rest are even gained."""
+    """As printed: at every frequency motions appear before the quasi-static border. Erratum 34: not far below resonance, where
+    even more cells have rest alone."""
     rows = [{"frequency": w, "lost": lost(tree), "gained": gained(tree), "outside": outside(tree)} for w, tree in panels.items()]
     always = bool(rows) and all(row["lost"] > row["gained"] for row in rows)
     fast = bool(rows) and all((row["lost"] > row["gained"]) == (row["frequency"] > CRITERIA.slow) for row in rows)
@@ -91,7 +92,8 @@ def _largest_amplitude(panels: Panels) -> Measured:
 
 
 def _second_motion(panels: Panels) -> Measured:
-    """As printed: in a narrow region. Erratum 33: in a strip of six impacts below Hcr, and wide ones of longer periods."""
+    """As printed: a second motion exists in a narrow region. Erratum 33: in a strip below Hcr with six impacts, and in wide
+    regions with longer periods."""
     fast = max(panels)
     cells = chart_cells(panels[fast])
     domain, period_three = cells.static, cells.with_motion(3, 2)
@@ -126,7 +128,7 @@ def _closed_form(panels: Panels) -> Measured:
 
 
 def agreement(data: Any) -> Measured:
-    """Charts from simulation against orbits from continuation: every motion of a cell that its neighbour lacks."""
+    """Whether charts from simulation and orbits from continuation agree, for every motion of a cell that its neighbour lacks."""
     judged, rows = [], []
     for tree in data.children.values():
         differ, added = tree["disagreements"].to_dataset(), int(tree["chart"].attrs.get("added_by_continuation", 0))
@@ -140,7 +142,7 @@ def agreement(data: Any) -> Measured:
 
 
 def right_cells(data: Any) -> Measured:
-    """Cells of the charts against the same ones with four times the starts on a finer grid."""
+    """Whether cells of the charts agree with the same cells computed with four times as many starts on a finer grid."""
     names = ("checked_cells", "wrong_cells", "wrong_rest", "wrong_motions", "wrong_chaos")
     panels = list(data.children.values())
     counts = [{name: int(tree["chart"].attrs[name]) for name in names} for tree in panels]
@@ -152,7 +154,7 @@ def right_cells(data: Any) -> Measured:
 
 
 def _named(tree: Any) -> dict[str, float]:
-    """By which numbers evidence names a panel."""
+    """The numbers by which the evidence names a panel."""
     beta0, damping = _parameters(tree)
     return {"frequency": float(tree.attrs["frequency"]), "beta0": beta0, "damping": damping}
 
@@ -177,7 +179,7 @@ def _parameters(tree: Any) -> tuple[float, float]:
 
 
 def _border_and_angle(angles: Panels) -> Measured:
-    """The shape is what is left when the border is measured in units of the quasi-static one at the same V."""
+    """The shape of the border: its Hhat in units of the quasi-static border's at the same V."""
     ends = (min(angles), max(angles))
     one, two = (onset(angles[beta0], ROWS) for beta0 in ends)
     static = [np.abs(ROWS / math.tan(math.radians(beta0))) for beta0 in ends]
@@ -195,7 +197,8 @@ def _farthest(ratio: np.ndarray) -> float:
 
 
 def _amplitude_falls(panels: Panels) -> Measured:
-    """As printed: from chart to chart in nearly all cells where both have motions. Erratum 46: the largest one of all."""
+    """As printed: amplitudes fall from chart to chart in nearly all cells in which both have motions. Erratum 46: only the
+    largest amplitude of each chart does."""
     sizes = {value: chart_cells(tree).amplitude for value, tree in panels.items()}
     largest = [float(np.nanmax(size)) for size in sizes.values()]
     shares = []

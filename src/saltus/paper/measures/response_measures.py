@@ -1,7 +1,7 @@
-"""What section 6 says of Figs. 9 to 13, measured: knots, superharmonics, loops, jumps, onsets, coexistence, symmetry.
+"""Measures for section 6 on Figs. 9 to 13: knots, superharmonics, loops, jumps, onsets, coexistence, symmetry.
 
-The panels of a figure are given by the value in which they differ, such as {0.2: tree, 0.5: tree}, in rising order. What it says
-of chaotic and quasi-periodic bands is measured in `chaos_measures.py`.
+The panels of a figure are given by the value in which they differ, such as {0.2: tree, 0.5: tree}, in rising order. The
+statements on chaotic and quasi-periodic bands are measured in `chaos_measures.py`.
 """
 
 from __future__ import annotations
@@ -35,33 +35,33 @@ Panels = Mapping[float, Any]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ResponseCriteria:
-    """By which numbers the statements on Figs. 9 to 13 are judged."""
+    """The numbers by which the statements on Figs. 9 to 13 are judged."""
 
     confirmed: float = 1e-8  # A stable motion returns to within this distance of itself by direct simulation.
     beside: float = 1e-9  # Branches are read at this relative distance on both sides of a value at which one may begin.
     on_branch: float = 2e-2  # A simulated attractor lies this near, in rad, to the line drawn between the points of its branch.
     equal: float = 1e-10  # Amplitudes that differ by less, in rad, are equal.
-    # Folds that are nearer to one another show in no picture: at Hhat = 0.2 the resonance's peak has two, 5e-7 apart.
+    # Folds nearer to one another than this are invisible in a picture: at Hhat = 0.2 the resonance's peak has two, 5e-7 apart.
     invisible: float = 1e-4
     resonance: float = 0.9  # The primary resonance of Fig. 9 is at about this frequency.
     samples: int = 600  # The number of values, an even one, at which the stable motions of a range are counted.
     apart: float = 0.1  # Motions or amplitudes that differ by more, in rad, plainly differ.
     large_load: float = 0.5  # Detached loops are there from this Hhat on.
     held: float = 1e-4  # A disturbance of 1e-5 rad at theta = 0 grows no larger, in rad, where rest is held.
-    left: float = 5e-4  # And larger than this where it is left in every period.
+    left: float = 5e-4  # The disturbance grows larger than this, in rad, where rest is left in every period.
     supercritical: float = 0.01  # A cycle that leaves rest begins with less than this share of its amplitude at Hcr.
     past_fold: float = 1e-3  # The relative distance past a fold at which the cycle's unstable companion is looked for.
     quarters: int = 4  # The number of parts of a range over which the number of stable motions is averaged.
     shared: float = 0.25  # Motions coexist over more than this share of a range.
-    shown_loops: int = 3  # The number of loops of a panel whose ranges the evidence names.
+    shown_loops: int = 3  # The number of loops of a panel whose ranges are given in the evidence.
 
 
 CRITERIA = ResponseCriteria()
-LOADS = np.array([1.0, 2.0, 5.0, 15.0])  # of Hcr, at which the amplitudes of two frequencies are compared
+LOADS = np.array([1.0, 2.0, 5.0, 15.0])  # multiples of Hcr at which the amplitudes of two frequencies are compared
 
 
 def confirmed(spectra: Iterable[Any]) -> Measured:
-    """The paper's own check, made of everything drawn: stable motions are those of the non-smooth equation."""
+    """The paper's own check, for all motions drawn: stable motions are motions of the non-smooth equation."""
     kept, off, orbits, attractors, unplaced = 0.0, 0.0, 0, 0, 0
     for spectrum in spectra:
         for _, branch in branches_of(spectrum):
@@ -148,7 +148,7 @@ def _superharmonics(panels: Panels) -> Measured:
 
 
 def loops(panels: Panels) -> Measured:
-    """In each panel a detached branch that somewhere is larger than all of the main one is there."""
+    """Whether each panel has a detached branch that is somewhere larger than all of the main branch."""
     rows = []
     for load, tree in panels.items():
         main, bounds = main_branch(tree), tree.attrs["bounds"]
@@ -171,7 +171,7 @@ def _rises_above(branch: Any, main: Any, bounds: Any) -> bool:
 
 
 def _jumps(panels: Panels) -> Measured:
-    """In every panel with loops; where other motions of about the same size lie by, a jump need not show in the amplitude."""
+    """Whether motions jump in every panel with loops; with other motions of about the same size nearby a jump may be small."""
     rows = []
     for load, tree in panels.items():
         sizes = np.abs(tree["jumps"]["after"].values - tree["jumps"]["before"].values)
@@ -190,7 +190,7 @@ def ground_spectra(panels: Panels) -> dict[str, Measured]:
 
 
 def equivalent_rotation(panels: Panels) -> Measured:
-    """The way that the mass goes sideways, the integral of sin(beta0 + theta), up to theta_eq, against zetahat."""
+    """The horizontal way of the mass up to theta_eq, the integral of sin(beta0 + theta), compared with zetahat."""
     from scipy.integrate import quad
 
     rows = []
@@ -228,7 +228,8 @@ def _critical(spectrum: Any) -> float:
 
 
 def _undeformed(panels: Panels) -> Measured:
-    """As printed: past Hcr motions leave for the limit cycle. Erratum 24: rest is left, and closed again, in every period."""
+    """As printed: beyond Hcr motions go from rest to the limit cycle. Erratum 24: rest is left, and reached again, in every
+    period."""
     turns, gone, rows = [], [], []
     for frequency, tree in panels.items():
         row = tree["undeformed"]
@@ -240,7 +241,7 @@ def _undeformed(panels: Panels) -> Measured:
 
 
 def _anticipated(panels: Panels) -> Measured:
-    """As printed: a supercritical cycle below Hcr. Erratum 36: stable, but born at a fold, with an amplitude of its own."""
+    """As printed: a supercritical cycle below Hcr. Erratum 36: it is stable, but born at a fold with a finite amplitude."""
     early, small, sudden, lost, rows = [], [], [], [], []
     for frequency, tree in panels.items():
         branch, critical, birth = main_branch(tree), _critical(tree), tree["birth"]
@@ -264,7 +265,8 @@ def _anticipated(panels: Panels) -> Measured:
 
 
 def _grows(panels: Panels) -> Measured:
-    """As printed: from its birth on. Erratum 30: from twice Hcr on, past the superharmonics of low frequency."""
+    """As printed: the first cycle's amplitude grows with Hhat from its birth on. Erratum 30: from twice Hcr on, beyond the
+    superharmonics at low frequencies."""
     always, later, rows = [], [], []
     for frequency, tree in panels.items():
         main = main_branch(tree)
@@ -292,7 +294,8 @@ def _rises(sizes: np.ndarray) -> bool:
 
 
 def _flattens(panels: Panels) -> Measured:
-    """As printed: everywhere. Erratum 30: where both frequencies are above the primary resonance, or the load is large."""
+    """As printed: the first cycle's amplitude falls with Omega at every load. Erratum 30: if both frequencies are above the
+    primary resonance, or the load is large."""
     critical = _critical(next(iter(panels.values())))
     sizes = np.array([_largest(main_branch(tree), critical * LOADS) for tree in panels.values()])
     falls, several = np.diff(sizes, axis=0) < 0, len(panels) > 1
@@ -302,7 +305,8 @@ def _flattens(panels: Panels) -> Measured:
 
 
 def coexistence(panels: Panels) -> Measured:
-    """As printed: their number grows with the load. Erratum 38: several coexist, but their mean number falls again.
+    """As printed: the number of coexisting stable motions grows with the load. Erratum 38: several coexist, but their mean number
+    falls again.
 
     The means are those over the quarters of the range beyond twice Hcr, by the branches and, independently, by the attractors on
     which simulated motions have settled.
@@ -339,7 +343,8 @@ def _means(values: np.ndarray, number: np.ndarray, edges: np.ndarray) -> np.ndar
 
 
 def border_of_rest(data: Any) -> Measured:
-    """As printed: theta = 0 is held up to abs(V / tan(beta0)) under load (iii). Erratum 35: while the ellipse lies inside."""
+    """As printed: theta = 0 is held up to abs(V / tan(beta0)) under load (iii). Erratum 35: as long as the ellipse of the loads
+    lies inside the border."""
     rest, disturbed, critical = data["undeformed"], data["disturbed"], _critical(data["a"])
     below, above, printed = map(float, disturbed["moved"].values)
     turns = bool(rest["held_below"]) and not bool(rest["held_above"])

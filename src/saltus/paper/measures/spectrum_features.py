@@ -1,4 +1,4 @@
-"""What a diagram shows, as numbers, from nothing but its DataTree: peaks, detached loops, coexisting motions, onsets."""
+"""The features of a diagram as numbers, from its DataTree alone: peaks, detached loops, coexisting motions, onsets."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ def within(spectrum: Any, branch: Any) -> np.ndarray:
 
 def main_branch(spectrum: Any) -> Any:
     """The period-1 branch that covers most of the range."""
-    bounds = spectrum.attrs.get("bounds", (-np.inf, np.inf))  # branches alone have none
+    bounds = spectrum.attrs.get("bounds", (-np.inf, np.inf))  # a tree of branches alone has no bounds
     branches = [branch for _, branch in branches_of(spectrum) if int(branch["period"][0]) == 1]
     return max(branches, key=lambda branch: np.ptp(np.clip(branch["parameter"].values, *bounds)))
 
 
 def detached(spectrum: Any) -> list[tuple[int, Any]]:
-    """The branches that no special point ties to another one and that reach into the range, without the main one."""
+    """The branches that no special point connects to another one and that reach into the range, without the main branch."""
     found, main = [], main_branch(spectrum)
     for number, branch in branches_of(spectrum):
         free = FREE_ENDS.issuperset(np.atleast_1d(branch.attrs["end_reasons"]).tolist())
@@ -51,7 +51,7 @@ def peaks(branch: Any, share: float = PROMINENT) -> np.ndarray:
 
 
 def superharmonic(branch: Any, share: float = PROMINENT) -> np.ndarray:
-    """The peaks at frequencies below 2/3 of that of the highest one, (n, 3): primary resonance is one to one, these are not."""
+    """The superharmonic peaks, (n, 3): those at frequencies below 2/3 of that of the highest peak, the primary resonance."""
     top = float(branch["parameter"].values[int(np.argmax(branch["amplitude"].values))])
     found = peaks(branch, share)
     return np.asarray(found[found[:, 0] < 2 / 3 * top])
@@ -69,7 +69,7 @@ def steps_of(lines: Iterable[BranchLine], stable: bool | None = None) -> np.ndar
 
 
 def passing(steps: np.ndarray, value: float) -> np.ndarray:
-    """The amplitudes with which steps (n, 4) pass a value of the parameter, their lower ends counted in."""
+    """The amplitudes at which steps (n, 4) pass a value of the parameter; a step contains its lower end, not its upper end."""
     x, y, later, there = steps[(np.minimum(steps[:, 0], steps[:, 2]) <= value) & (value < np.maximum(steps[:, 0], steps[:, 2]))].T
     return np.asarray(y + (value - x) / (later - x) * (there - y))
 
@@ -78,7 +78,7 @@ def stable_motions(spectrum: Any, values: np.ndarray) -> np.ndarray:
     """How many stable periodic motions coexist at values of the parameter (n,), mirror images counted once, (n,)."""
     lines = [line.places[:, 0] for _, branch in branches_of(spectrum) for line in smooth_lines(branch) if line.stable]
     steps = np.concatenate([np.empty((0, 2)), *(np.stack([x[:-1], x[1:]], axis=1) for x in lines)])
-    # A step is passed at its lower end already and at its upper end no more, as in `passing`.
+    # A step contains its lower end, but not its upper end, as in `passing`.
     begun, over = (np.searchsorted(np.sort(ends), values, side="right") for ends in (steps.min(axis=1), steps.max(axis=1)))
     return np.asarray(begun - over)
 

@@ -1,4 +1,4 @@
-"""How much of what Figs. 9 to 13 draw the reduced model can say of the mechanism (errata 20, 21)."""
+"""For which share of the motions in Figs. 9 to 13 the reduced model is valid (errata 20, 21)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ AGREED = 0.01  # The least reactions by two equations agree within this, relativ
 def validity(figure: str, panels: Mapping[str, Any]) -> Measured:
     """As the reduction assumes: no stable motion opens the closed layer. Errata 20 and 21: which share of them does, and how far.
 
-    `panels` is by the label of each. The second kind of evidence are the rows of `eomnl` along simulated motions.
+    `panels` has the label of each panel as key. The second kind of evidence are the rows of `eomnl` along simulated motions.
     """
     found = {label: shares(tree) for label, tree in panels.items()}
     violated, beyond = ([one[name] for one in found.values()] for name in ("violated", "beyond"))

@@ -17,7 +17,7 @@ BROWSERS = (
     "/Applications/Chromium.app/Contents/MacOS/Chromium",
     "/Applications/Microsoft Edge.app/Contents/MacOS/Microsoft Edge",
 )
-LONGEST = 120.0  # s; a report of all parts takes some five
+LONGEST = 120.0  # s; a report of all parts takes about five seconds
 
 
 def browser() -> str | None:
@@ -26,9 +26,9 @@ def browser() -> str | None:
 
 
 def print_pdf(page: Path, pdf: Path, mark: Path) -> str | None:
-    """Print an HTML file of our own, unless `mark` says that this was done of its very bytes; why it was not, or None.
+    """Print an HTML file of our own, unless `mark` says that exactly these bytes were printed; returns why it failed, or None.
 
-    A PDF of an earlier report is removed, so that none is taken for one of this report.
+    A PDF of an earlier report is removed, so that it is not taken for the present one.
     """
     content = page.read_bytes()
     if pdf.exists() and mark.exists() and mark.read_text(encoding="utf-8") == _mark(content, pdf):
@@ -41,7 +41,7 @@ def print_pdf(page: Path, pdf: Path, mark: Path) -> str | None:
         made = Path(folder) / "report.pdf"
         options = [f"--user-data-dir={folder}/profile", f"--print-to-pdf={made}", "--no-pdf-header-footer", "--disable-gpu"]
         if hasattr(os, "geteuid") and os.geteuid() == 0:
-            options.append("--no-sandbox")  # without which it refuses to run as root; the page is ours and loads nothing
+            options.append("--no-sandbox")  # else the browser refuses to run as root; the page is ours and loads nothing
         try:
             subprocess.run(
                 [found, "--headless", *options, page.resolve().as_uri()], capture_output=True, timeout=LONGEST, check=True

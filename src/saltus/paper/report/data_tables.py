@@ -1,4 +1,4 @@
-"""What a netCDF file holds, as tables for a reader: its variables, the systems and the settings of its panels."""
+"""The contents of a netCDF file as tables for a reader: its variables, the systems and the settings of its panels."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from saltus.errors import ParameterError
 from saltus.files import checked_content
 from saltus.paper.toml_tables import toml_table
 
-ANGLES = ("beta0", "alpha")  # numbers of the paper's models in rad, which a reader knows in degrees
+ANGLES = ("beta0", "alpha")  # angles of the paper's models in rad, which are shown in degrees
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,7 +25,7 @@ class VariableRow:
     """One variable, with the panels that have it."""
 
     panels: str
-    path: str  # of its group within the panel, and its name
+    path: str  # the path of its group within the panel, and its name
     dims: str
     units: str
     meaning: str
@@ -33,7 +33,7 @@ class VariableRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValueRow:
-    """A parameter of the system or a setting, with its value in each panel that has another."""
+    """A parameter of the system or a setting, with its value, or its values in the panels if they differ."""
 
     name: str
     meaning: str
@@ -77,7 +77,7 @@ def _tables_of(file: Any) -> DataTables:
             units, meaning = (str(variable.attrs.get(key, "")) for key in ("units", "long_name"))
             row = (f"{inner}/{name}".strip("/"), units, meaning or _words("meanings").get(name, ""))
             variables.setdefault(row, []).append(panel)
-            if row not in dims:  # to look them up is slow, and panels have the same
+            if row not in dims:  # looking dimensions up is slow, and all panels have the same ones
                 dims[row] = ", ".join(variable.dimensions)
         for name, value in group.attrs.items():
             if name == "system" and panel not in parameters.get("model.type", {}):
@@ -96,7 +96,7 @@ def _tables_of(file: Any) -> DataTables:
 
 
 def _groups(group: Any, panel: str = "", inner: str = "") -> Iterator[tuple[str, str, Any]]:
-    """Every group as its panel, its path within that and itself; of those that are numbered alike the first stands for all."""
+    """Every group: its panel, its path within the panel and itself; of numbered groups, such as curves, only the first."""
     yield panel, inner, group
     seen = set()
     for name, child in group.groups.items():
@@ -124,13 +124,13 @@ def _text(value: Any) -> str:
 
 
 def _parameter_row(name: str, values: Mapping[str, str], paths: Mapping[str, str]) -> ValueRow:
-    """A number of the system; where a panel's diagram or chart is drawn over it, it has no one value."""
+    """A number of the system; it has no single value in a panel whose diagram or chart is drawn over it."""
     varied = {panel: "varied" if re.search(rf"\b{re.escape(name)}\b", path) else None for panel, path in paths.items()}
     return _value_row(name, "", {panel: varied.get(panel) or value for panel, value in values.items()})
 
 
 def _value_row(name: str, meaning: str, values: Mapping[str, str]) -> ValueRow:
-    """One value if all panels have the same, otherwise each with its panels."""
+    """One value if all panels have the same one, otherwise each value with its panels."""
     by_value: dict[str, list[str]] = {}
     for panel, value in values.items():
         by_value.setdefault(value, []).append(panel)
@@ -149,6 +149,6 @@ def _panels(names: list[str]) -> str:
 
 
 def _words(table: str) -> dict[str, str]:
-    """The words for `settings`, the attributes that are settings, or the `meanings` of variables that say none themselves."""
+    """The words for `settings` (attributes), or the `meanings` of variables that have no description of their own."""
     words: dict[str, str] = toml_table("report", "variables.toml")[table]
     return words

@@ -10,7 +10,7 @@ from pathlib import Path
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EmbeddedPicture:
-    """A picture as an HTML page holds it."""
+    """A picture in the form in which an HTML page contains it."""
 
     uri: str
     width: int  # in pixels
@@ -26,7 +26,7 @@ def embedded(path: Path) -> EmbeddedPicture:
         width, height = picture.size
         kind = "webp" if features.check("webp") else "png"
         if kind == "webp":
-            # Least effort would double the size, and more than 2 gains nothing.
+            # The least effort would double the size, and an effort above 2 gains nothing.
             picture.convert("RGB").save(buffer, format="WEBP", lossless=True, quality=50, method=2)
     content = buffer.getvalue() or path.read_bytes()
     return EmbeddedPicture(uri=f"data:image/{kind};base64,{base64.b64encode(content).decode()}", width=width, height=height)

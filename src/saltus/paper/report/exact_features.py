@@ -1,4 +1,4 @@
-"""What the exact treatment adds to the paper's figures, counted in their data: grazings, loops, bands, two-parameter curves."""
+"""Features that the exact treatment adds to the paper's figures, counted in their data: grazings, loops, bands, curves."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def chart_features(folder: Path, present: Mapping[str, str]) -> Table:
 
 
 def _rows(path: Path, title: str, mark: str, counted: Callable[[Any], tuple[str, ...]]) -> Table:
-    """What is counted of each group that has a group `mark`: that is a panel."""
+    """A row of counts for each panel: each group that has a child `mark`."""
     import h5netcdf
 
     with h5netcdf.File(io.BytesIO(checked_content(path)), "r") as file:

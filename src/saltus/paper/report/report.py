@@ -44,8 +44,8 @@ def write_report(figures: Iterable[PaperFigure], folder: Path, known: Mapping[st
 def report_from_results(folder: Path | str) -> list[str]:
     """Write the report anew from the results in a folder, computing nothing; return the names of the parts in it.
 
-    Parts that other sources have made are shown too, and said to be so. A part whose files are not those of its record, or whose
-    record cannot be read, is left out.
+    Parts that were made by other sources are shown too, and marked. A part is left out if its files are not those of its record,
+    or if the record cannot be read.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def report_from_results(folder: Path | str) -> list[str]:
 
 
 def report_as_pdf(folder: Path | str) -> str | None:
-    """Print report.html of a folder as report.pdf, if a browser is there and it is not done yet; why it was not, or None."""
+    """Print report.html of a folder as report.pdf, if there is a browser and it is not done yet; returns why not, or None."""
     folder = Path(folder)
     return print_pdf(folder / PAGE, folder / PRINT, folder / state.FOLDER / f"{PRINT}.sha256")
 
@@ -122,9 +122,9 @@ def _environment() -> Any:
 
 
 class Linker:
-    """Makes the ids of claims and the numbers of errata within a text to links, and `names` to code; all else is escaped.
+    """Turns the ids of claims and the numbers of errata within a text into links, and `names` into code; the rest is escaped.
 
-    An id that is an English word, such as `period`, is one only where its verdict follows or the word "claim" precedes it.
+    A word that is also English, such as `period`, is taken as an id only if its verdict follows or the word "claim" precedes it.
     """
 
     def __init__(self, ids: set[str]) -> None:
@@ -134,7 +134,7 @@ class Linker:
         self._pattern = re.compile(rf"`(?P<code>[^`]+)`|(?<![\w/:.-])(?:erratum (?P<number>\d+)|{claim})(?![\w/:-])")
 
     def __call__(self, text: str, without: str = "") -> Any:
-        """The text as markup; no link to the claim or erratum `without`, in which it stands."""
+        """The text as markup, with no link to `without`, the claim or erratum that contains the text."""
         from markupsafe import Markup, escape
 
         parts, end = [], 0
@@ -149,7 +149,7 @@ class Linker:
 
 
 def placed(text: str) -> Any:
-    """Where something is in the paper: labels of equations become their numbers, and the rest is escaped."""
+    """A place in the paper as markup: labels of equations become their numbers, and the rest is escaped."""
     from markupsafe import Markup, escape
 
     parts = []
@@ -163,7 +163,7 @@ def placed(text: str) -> Any:
 
 
 def _equation(label: str) -> Any:
-    """An equation by its number, or None where the label is none of the paper's."""
+    """The equation's number as markup, or None if the label is not one of the paper."""
     from markupsafe import Markup
 
     number = toml_table("equations.toml").get(label)

@@ -1,4 +1,4 @@
-"""What the report shows, gathered from the parts of the paper, their records and their data, as values for its templates."""
+"""The contents of the report, gathered from the parts of the paper, their records and their data, as values for templates."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from saltus.paper.report.data_tables import DataTables, data_tables
 from saltus.paper.report.embedded_pictures import EmbeddedPicture, embedded
 from saltus.paper.report.exact_features import chart_features, diagram_features
 
-BEYOND = "B"  # the section of what the paper does not treat; it has a chapter of its own
+BEYOND = "B"  # the section of subjects that the paper does not treat; it has a chapter of its own
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,17 +34,17 @@ class FileLink:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportPart:
-    """A figure, table or group of statements with all that says how it was made."""
+    """A figure, table or group of statements, with the record of how it was made."""
 
     figure: PaperFigure
     claims: list[Claim]
     files: list[FileLink]
     seconds: float
     versions: str
-    stale: bool  # other sources than the present ones made it
+    stale: bool  # whether it was made by other sources than the present ones
     data: DataTables
     picture: EmbeddedPicture | None
-    table: list[list[str]]  # a table of the paper, its first row the headings
+    table: list[list[str]]  # a table of the paper; its first row are the headings
 
     @property
     def code(self) -> str:

@@ -1,1 +1,1 @@
-"""Sections 2 to 5 and the appendix: what is computed to judge the statements that no figure bears on."""
+"""Sections 2 to 5 and the appendix: the computations by which statements are judged that belong to no figure."""

@@ -1,4 +1,4 @@
-"""Derivatives by differences, for residuals that no formula of the code itself enters."""
+"""Derivatives by differences, for residuals that are to be independent of the formulas in the code."""
 
 from __future__ import annotations
 

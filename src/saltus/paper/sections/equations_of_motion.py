@@ -92,7 +92,7 @@ def _operators_residual(model: Any, theta: Any) -> float:
 
 
 def _excitation() -> dict[str, float]:
-    """By how much f0 and K0 change over a period when one channel alone varies: the least of the six, for beta0 = 80 and 90."""
+    """The change of f0 and K0 over a period if one channel alone varies: the least of the six, for beta0 = 80 and 90."""
     times, found = np.linspace(0, 2 * np.pi, 13), dict[str, float]()
     for degrees in (80, 90):
         model, swings = TwoLayer(beta0=float(np.deg2rad(degrees)), mass_ratio=0.4), []

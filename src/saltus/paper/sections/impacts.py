@@ -27,7 +27,7 @@ from saltus.systems import (
 )
 from saltus.theory import energy_factor, energy_jump, equilibria, total_energy
 
-TIME = 0.2  # at which the impacts take place: no load and no ground velocity is zero there
+TIME = 0.2  # the time of the impacts, at which no load and no ground velocity is zero
 
 
 def compute(impacts: int = 400) -> Any:
@@ -138,7 +138,7 @@ def _still_ground() -> dict[str, float]:
 
 
 def _without_root() -> dict[str, float]:
-    """An energy restitution on a moving ground that no velocity after the impact meets, and one that is met."""
+    """An energy restitution on a moving ground for which there is no velocity after the impact, and one for which there is."""
     model, load = Metainterface(beta0=np.deg2rad(80.0)), Load(frequency=1.0, ground_horizontal=Harmonic(amplitude=0.5))
     law = EnergyRestitution(0.6)
     slow, fast = (float(law.velocity_after(model, 0.0, v, -1, 1, load)) for v in (0.05, 2.0))
@@ -210,7 +210,8 @@ def _both_factors(rng: np.random.Generator, impacts: int = 60) -> dict[str, floa
 
 
 def _stable_states() -> dict[str, float]:
-    """How many stable equilibria the loaded cell has, and at most a rocking block of any slenderness, lying flat left out."""
+    """The number of stable equilibria of the loaded cell, and the largest number of a rocking block of any slenderness, without
+    those on its sides."""
     block = 0
     for alpha in np.linspace(0.05, 1.5, 30):
         angle = np.linspace(1e-6, np.pi / 2, 4001)

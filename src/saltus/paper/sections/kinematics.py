@@ -70,7 +70,7 @@ def _drawn(cell: Any, openings: np.ndarray) -> dict[str, float]:
 
 
 def _closing_cells(count: int = 40) -> int:
-    """For how many pairs of angles in (0, pi) `restangle` and a triangle with edges of positive length say different things.
+    """For how many pairs of angles in (0, pi) `restangle` disagrees with the existence of a triangle with positive edges.
 
     The base, the inclined bar of length 1 and the diagonal meet where two rays from the base's ends, at alpha0 and beta0, cross.
     """
@@ -100,7 +100,7 @@ def _limits() -> dict[str, float]:
 
 
 def _dimensions() -> dict[str, float]:
-    """One cell written in seconds and in milliseconds: what changes has a dimension. tau against tau = t sqrt(M2 / K2)."""
+    """One cell written in seconds and in milliseconds: a number that changes has a dimension, as t sqrt(M2 / K2), unlike tau."""
     seconds = PhysicalCell(length=0.2, upper_mass=1.5, upper_stiffness=3.0, upper_damping=0.07)
     millis = PhysicalCell(length=0.2, upper_mass=1.5, upper_stiffness=3.0e-6, upper_damping=0.07e-3)
     inertia = seconds.upper_mass * seconds.length**2

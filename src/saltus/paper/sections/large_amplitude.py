@@ -53,9 +53,9 @@ def _is_saddle(energy: Any, place: np.ndarray) -> bool:
 
 
 def _mirrors(rng: np.random.Generator, motions: int) -> dict[str, float]:
-    """How far a motion's end, mirrored about either axis and followed as long, is from its mirrored start: the most of several.
+    """The largest distance, for several motions, between the mirrored start and the end of a motion from the mirrored end.
 
-    Mirroring about the axis of theta' or of theta reverses the time, so that it exchanges start and end.
+    Mirroring about the axis of theta' or of theta reverses the time, so that start and end are exchanged.
     """
     starts = [(float(q), float(v)) for q, v in zip(rng.uniform(-1.5, 1.5, motions), rng.uniform(-0.4, 0.4, motions), strict=True)]
     cases = {"free": constant_load(), "damped": constant_load(damping=0.1), "unequal": constant_load(stiffness=1.1)}

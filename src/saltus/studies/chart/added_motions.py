@@ -1,4 +1,4 @@
-"""A stability chart with motions to which no initial state has led, but a motion of a neighbouring cell."""
+"""Motions that are added to a cell of a stability chart: a neighbour's motion leads to them, but no initial state has."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from saltus.studies.chart.request import ChartRequest
 if TYPE_CHECKING:
     import xarray
 
-ADDED = "added_by_continuation"  # an attribute of the chart: how many
+ADDED = "added_by_continuation"  # the attribute of the chart that counts them
 
 
 def with_motions(chart: xarray.Dataset, request: ChartRequest, cells: np.ndarray, found: np.ndarray) -> xarray.Dataset:
-    """The chart with motions in these cells, (n, 2) rows and columns, of `way_type`, where these have them not yet, and with what
-    further motions starts from these lead to."""
+    """The chart with the motions found, of `way_type`, in these cells, (n, 2) rows and columns, unless the cells have them
+    already, and with the motions to which these lead in neighbouring cells."""
     made = chart.transpose("vertical", "horizontal", ...).copy(deep=True).load()  # its arrays are written to
     shape, known = made["count"].shape, read_motions(made)
     new = _as_motions(np.ravel_multi_index(tuple(cells.T), shape), found)
@@ -30,7 +30,7 @@ def with_motions(chart: xarray.Dataset, request: ChartRequest, cells: np.ndarray
         return made
     motions = by_cell(spread(request, new, distinct(np.concatenate([known, new]))))
     columns = table(motions, made["count"].size, request.variables)
-    complete = made["count"].values <= KEPT  # of other cells not all motions are kept, and none are added
+    complete = made["count"].values <= KEPT  # other cells keep only some of their motions, so that none are added there
     before = int(made["count"].sum())
     for name, values in columns.items():
         made[name].values[complete] = values.reshape(*shape, *values.shape[1:])[complete]
@@ -43,13 +43,13 @@ def with_motions(chart: xarray.Dataset, request: ChartRequest, cells: np.ndarray
 
 
 def has_motion(chart: ChartMotions, cell: np.ndarray, amplitude: float) -> bool:
-    """Whether a cell, its row and column, has a motion of about this amplitude."""
+    """Whether a cell, given by its row and column, has a motion of about this amplitude."""
     there = chart.motions["amplitude"][(chart.place == cell).all(axis=1)]
     return bool(np.abs(there - amplitude).min(initial=np.inf) < ALIKE.followed * amplitude)
 
 
 def _as_motions(cells: np.ndarray, found: np.ndarray) -> np.ndarray:
-    """Motions on the way, of `way_type`, as motions of cells."""
+    """Motions of `way_type` as motions of cells, of `motion_type`."""
     motions = np.zeros(len(found), motion_type(found["state"].shape[1]))
     motions["cell"] = cells
     for name in SEEN:

@@ -19,8 +19,7 @@ ON_LINE = 1e-9  # largest distance, in cells, of a crossing from the line throug
 
 
 def curve_dataset(curve: Any, paths: Sequence[str]) -> xarray.Dataset:
-    """A curve of special points as a Dataset along `point`: `horizontal`, `vertical`, the `amplitude` of its orbits, their
-    `residual`."""
+    """A curve of special points as a Dataset along `point`: `horizontal`, `vertical`, `amplitude`, `residual` of its orbits."""
     data = curve.to_xarray()
     order = [list(curve.paths).index(path) for path in paths]
     for name, i in zip(("horizontal", "vertical"), order, strict=True):
@@ -33,8 +32,8 @@ def curve_dataset(curve: Any, paths: Sequence[str]) -> xarray.Dataset:
 
 
 def crossings(chart: ChartMotions, curve: xarray.Dataset) -> np.ndarray:
-    """Where a curve crosses the lines through the cells' middles, along rows, then along columns, (n, 3): the place, in cells
-    from the first row and column, and the orbit's amplitude there."""
+    """Where a curve crosses the rows and the columns of the cells' middles, (n, 3): row and column as numbers of cells from the
+    first ones, not necessarily whole, and the orbit's amplitude there."""
     rows, columns = (
         np.interp(curve[name].values, axis, np.arange(len(axis)), left=-1, right=len(axis))
         for name, axis in (("vertical", chart.vertical), ("horizontal", chart.horizontal))
@@ -50,7 +49,8 @@ def crossings(chart: ChartMotions, curve: xarray.Dataset) -> np.ndarray:
 
 
 def explained(chart: ChartMotions, changes: Changes, curves: Sequence[xarray.Dataset]) -> np.ndarray:
-    """Whether a curve of about such orbits passes between the two cells, or through the cells before and behind them."""
+    """Whether a curve explains each change: one of orbits similar to the motion that crosses the line between the two cells, or
+    its continuation by one cell on both sides."""
     known = np.zeros(len(changes), dtype=bool)
     motions, step = chart.motions[changes.motion], changes.target - changes.source
     for curve in curves:
@@ -65,7 +65,7 @@ def explained(chart: ChartMotions, changes: Changes, curves: Sequence[xarray.Dat
 
 
 def _is_similar(amplitudes: np.ndarray, amplitude: float) -> np.ndarray:
-    """Whether motions may end in an orbit of this amplitude."""
+    """Whether motions of these amplitudes may end in an orbit of this amplitude."""
     return np.asarray(np.abs(amplitudes - amplitude) <= ALIKE.curve * np.maximum(amplitudes, amplitude))
 
 
@@ -81,9 +81,11 @@ def passes_through(chart: ChartMotions, curve: xarray.Dataset, spot: Sequence[fl
 
 
 def unseen_folds(chart: ChartMotions, curves: Sequence[xarray.Dataset]) -> np.ndarray:
-    """Places (n, 2), row and column, where a fold of motions that count runs between cells none of which has one of them.
+    """Places (n, 2), row and column, where a curve of folds of motions that count runs between cells, and none of these has such
+    a motion.
 
-    Where another border of theirs is less than a cell away they exist in too narrow a strip for a cell to show it.
+    Places with another border of the same motions less than a cell away are left out: the motions may exist in a strip between
+    the two that is too narrow to contain the middle of a cell.
     """
     found, rows = [np.empty((0, 2))], [crossings(chart, curve) for curve in curves]
     rows = [row[((row[:, :2] >= 0) & (row[:, :2] <= np.array(chart.monostable.shape) - 1)).all(axis=1)] for row in rows]

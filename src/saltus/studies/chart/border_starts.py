@@ -1,4 +1,4 @@
-"""Where border curves are begun: the ends of motions between cells that lie beside one another are ends on one border."""
+"""Where border curves are begun: ends of similar motions that lie beside one another are taken as points of one border."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class BorderStartSettings:
 
     reach: float = 1.5  # Ends no farther than this from one another, in cells, may lie on one border.
     fewest: int = 3  # The least number of ends on a border that is followed.
-    beside_rest: int = 10  # An end counts this many times beside rest alone: that is what a designer asks for.
-    tries: int = 8  # The most ends of a border from which its curve is begun.
+    beside_rest: int = 10  # An end beside cells with rest alone counts this many times, as designers ask for the border of rest.
+    tries: int = 8  # The largest number of ends of a border from which its curve is tried to be begun.
     beyond: float = 0.5  # Orbits are followed this far beyond the end of their motion, in cells.
 
 
@@ -28,7 +28,7 @@ SETTINGS = BorderStartSettings()
 
 
 def border_starts(chart: ChartMotions, changes: Changes, endings: np.ndarray) -> list[list[dict[str, Any]]]:
-    """For each border, the most urgent ones first, the motions from whose ends it may be begun."""
+    """For each border, the most important ones first, the motions from whose ends its curve may be begun."""
     rows = np.flatnonzero(np.isin(endings["outcome"], ENDS))
     number, weight = _borders(chart, changes.only(rows), endings[rows])
     size = np.bincount(number)
@@ -38,13 +38,14 @@ def border_starts(chart: ChartMotions, changes: Changes, endings: np.ndarray) ->
 
 
 def places(changes: Changes, endings: np.ndarray) -> np.ndarray:
-    """Where motions end, row and column in cells, (n, 2): halfway from where they have settled last to where they are gone."""
+    """Where motions end, row and column in cells, (n, 2): halfway between the last place where a motion has settled and the first
+    place where it is lost."""
     share = 0.5 * (endings["settled"] + endings["next"]["share"])
     return np.asarray(changes.source + share[:, None] * (changes.target - changes.source))
 
 
 def _borders(chart: ChartMotions, changes: Changes, endings: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The number of the border on which each end lies, and what it counts."""
+    """The number of the border on which each end lies, and the weight of each end."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree

@@ -1,7 +1,7 @@
-"""The work on the borders of a chart as sweeps: what becomes of its changes, and the curves through their ends, in chunks.
+"""The work on the borders of a chart as sweeps, in chunks: what becomes of its changes, and the curves through their ends.
 
-Both are pure functions of arguments that JSON has. With a store they are kept in folders of the chart's own store, each named by
-a digest of what is computed, so that a run that was stopped goes on.
+Both are pure functions of arguments that can be written as JSON. The results are kept in folders of the chart's own store, each
+named by a digest of what is computed, so that a run that was stopped goes on.
 """
 
 from __future__ import annotations
@@ -33,18 +33,18 @@ if TYPE_CHECKING:
     from saltus.sweep import Plan
 
 ENDS, CURVES = "saltus.studies.chart.border_work:ends", "saltus.studies.chart.border_work:curves"
-# Changes of a chunk, as many as most charts have: where the end of one is enclosed in many steps, it had better be in the company
-# of all others. Together they take some seconds, no more than one would lose.
+# Changes in a chunk, as many as most charts have: a change whose end takes many steps to enclose costs little if it is followed
+# in lanes together with all others. All take some seconds, which a run that is stopped can afford to lose.
 CHUNK = 10_000
-CURVE_BYTES = 1 << 17  # of a curve as text: 1000 points
-# Of a curve in each direction. Curves from one side of a chart to the other take 20 to 75; one that needs more creeps beside a
-# grazing, by less than a hundredth of a cell a step, and four fifths of the time of Fig. 14 (a) went into such steps.
+CURVE_BYTES = 1 << 17  # the most bytes of a curve as text: 1000 points
+# The most points of a curve in each direction. Curves from one side of a chart to the other take 20 to 75. One that needs more
+# creeps along a grazing, by less than a hundredth of a cell a step; four fifths of the time of Fig. 14 (a) went into such steps.
 MOST_POINTS = 100
 
 
 @dataclass(frozen=True)
 class Workshop:
-    """Where the work on a chart's borders is done, and on which system."""
+    """The system and the numbers of the work on a chart's borders, and who does this work."""
 
     system: System
     paths: tuple[str, str]
@@ -56,7 +56,7 @@ class Workshop:
     workers: int | None = None
 
     def ends(self, chart: ChartMotions, changes: Changes, progress: Progress) -> np.ndarray:
-        """What becomes of each of these changes, of `ending_type`."""
+        """What becomes of the motion of each of these changes, of `ending_type`."""
         kind = ending_type(self.system.dimension)
         if not len(changes):
             return np.zeros(0, kind)
@@ -73,7 +73,7 @@ class Workshop:
         return np.asarray(unstructured_to_structured(found, kind))
 
     def curves(self, starts: Sequence[Any], bounds: Any, progress: Progress) -> list[xarray.Dataset | None]:
-        """The curve from the first of each of these lists of starts that leads to one, or None."""
+        """For each list of starts, the curve from the first of them that leads to one, or None."""
         arguments = {"starts": list(starts), "bounds": bounds}
         found = self._run(CURVES, arguments, "start", len(starts), 1, ("byte", CURVE_BYTES), "u1", progress)
         return [_read(row) for row in found]
@@ -150,7 +150,7 @@ def curves(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, 
 
 
 def as_record(data: xarray.Dataset) -> dict[str, Any]:
-    """A dataset as JSON has it."""
+    """A dataset as a dictionary that can be written as JSON."""
     variables = {
         name: [list(variable.dims), variable.dtype.str, variable.shape, variable.values.tolist(), dict(variable.attrs)]
         for name, variable in data.variables.items()
@@ -160,7 +160,7 @@ def as_record(data: xarray.Dataset) -> dict[str, Any]:
 
 
 def _read(row: np.ndarray) -> xarray.Dataset | None:
-    """The dataset that a row of bytes has the record of."""
+    """The dataset whose record is written in a row of bytes; None if there is none."""
     import xarray
 
     text = bytes(row).rstrip(b"\0")
@@ -197,7 +197,7 @@ def curve_from(system: System, paths: Sequence[str], start: Mapping[str, Any], b
 
 
 def special_point(system: System, paths: Sequence[str], start: Mapping[str, Any]) -> SpecialPoint | None:
-    """The special point at which a motion ends between two cells, by continuation of its orbit from close to it."""
+    """The special point at which a motion ends between two cells, by continuation of its orbit (`start` as in `curve_from`)."""
     here = system.with_(dict(zip(paths, start["place"], strict=True)))
     try:
         orbit = find_orbit(here, **start_at(system, start["state"]), period=int(start["period"]), settle=0)

@@ -1,7 +1,7 @@
 """The exact borders of a stability chart: where its motions are born or lose their stability.
 
-What becomes of every motion that a neighbouring cell has not is found by simulation between the two cells. From the ends of
-motions that lie on the widest borders orbits are solved for, and their special points are followed as curves through the plane.
+If a cell has a motion that its neighbour lacks, simulation between the two cells shows what becomes of the motion. At the ends of
+motions on the longest borders the orbits are solved for, and their special points are followed as curves through the plane.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ class BorderSettings:
     """How much work the borders of a chart may take."""
 
     curves: int = 12  # The largest number of curves on which motions end.
-    batch: int = 4  # Curves are followed so many at a time; the ends that they explain begin no further ones.
-    rounds: int = 12  # How often motions are added to cells, and the changes about these looked into.
+    batch: int = 4  # The number of curves that are followed at a time; no further curve is begun at ends that they explain.
+    rounds: int = 12  # The largest number of rounds in which motions are added to cells, and the new changes looked into.
 
 
 SETTINGS = BorderSettings()
@@ -51,7 +51,7 @@ class Borders:
     curves
         The curves on which motions end.
     endings
-        What becomes of each change, of `ending_type`, by its key.
+        What becomes of the motion of each change, of `ending_type`, by the change's key (see `keys_of`).
 
     Examples
     --------
@@ -63,7 +63,7 @@ class Borders:
     endings: dict[tuple[int, ...], np.ndarray] = field(default_factory=dict)
 
     def of(self, chart: ChartMotions, changes: Changes) -> np.ndarray:
-        """What becomes of these changes, of `ending_type`; of those that were not looked into nothing is known.
+        """What becomes of the motions of these changes, of `ending_type`; unknown for changes that were not looked into.
 
         Parameters
         ----------
@@ -78,9 +78,9 @@ class Borders:
         return np.array(found, dtype=kind).reshape(len(changes))
 
     def to_xarray(self, chart: ChartMotions) -> xarray.DataTree:
-        """The curves as groups, and all changes of a chart in the group `ends`: `key` (see `keys_of`), the `outcome`,
-        `horizontal` and `vertical` of the place at which the motion ends, up to how many cells it may be off (`uncertainty`),
-        the `amplitude` and the `period` there.
+        """The curves as groups, and all changes of a chart in the group `ends`: `key` (see `keys_of`), the `outcome`, the place
+        at which the motion ends (`horizontal`, `vertical`) with its `uncertainty` in cells, and the last `amplitude` and `period`
+        of the motion.
 
         Parameters
         ----------
@@ -118,25 +118,25 @@ def with_borders(
     scheduler: str | None = None,
     progress: Progress = silent,
 ) -> tuple[xarray.Dataset, Borders]:
-    """A chart with the stable motions that go on into a cell where no start has led to them, and the exact borders of it.
+    """A chart completed by the stable motions that go on into a cell where no start has led to them, and its exact borders.
 
-    Where a cell has a motion and its neighbour none alike, the motion is followed towards the neighbour by simulation, and its
-    end enclosed between two values; all changes are looked into so. A motion that reaches the neighbour is added to the chart.
-    From the ends on the widest borders, above all those beside rest alone, the orbit is continued to its special point, and the
-    curve of LP, PD, BPC or GR through it followed through the plane of the chart.
+    Where a cell has a motion that its neighbour lacks, the motion is followed by simulation towards the neighbour, and its end is
+    enclosed between two values of the parameter. A motion that reaches the neighbour is added to the chart. At the ends on the
+    longest borders, above all those next to cells with rest alone, the orbit is continued to its special point, and the curve of
+    LP, PD, BPC or GR through this point is followed through the plane of the chart.
 
     Parameters
     ----------
     system
-        That of the chart.
+        The system of the chart.
     chart
-        As `stability_chart` returns it.
+        A chart as `stability_chart` returns it.
     curves
-        How many curves at most.
+        The largest number of curves.
     store
-        The chart's own; the work on its borders is kept in chunks in it, and a run that was stopped goes on.
+        The store of the chart; the work on its borders is kept in it in chunks, so that a run that was stopped goes on.
     workers, scheduler
-        Who computes them, see `saltus.sweep.run`.
+        Who computes the chunks, see `saltus.sweep.run`.
     progress
         Called with the fraction done and what is being done.
 
@@ -165,14 +165,14 @@ def with_borders(
 
 
 class _BorderSearch:
-    """A chart that gains motions, and what is known of its borders."""
+    """The search for borders: the chart, to which motions are added, and the borders found so far."""
 
     def __init__(self, request: ChartRequest, work: Workshop, chart: xarray.Dataset) -> None:
         self.request, self.work, self.chart, self.borders = request, work, chart, Borders()
         self._begun: set[str] = set()  # the starts of curves that were tried
 
     def complete(self, progress: Progress) -> None:
-        """Look into all changes, and into those about the motions that this adds to the chart, until it adds none."""
+        """Look into all changes of the chart and add the motions that go on; repeat with the new changes until none is added."""
         for i in range(SETTINGS.rounds):
             cells = read_chart(self.chart)
             changes, known = changes_of(cells), self.borders.endings
@@ -186,7 +186,8 @@ class _BorderSearch:
                 break
 
     def _missed(self, cells: ChartMotions, changes: Changes) -> tuple[Changes, np.ndarray]:
-        """The changes whose motion reaches a neighbour that has it not; where it has it, nothing changes."""
+        """The changes whose motion reaches a neighbour that lacks it; if the neighbour has it, the change is marked as
+        continued."""
         found = self.borders.of(cells, changes)
         reached = np.flatnonzero(found["outcome"] == ChangeOutcome.MISSED)
         there = [has_motion(cells, changes.target[k], found["last"]["amplitude"][k]) for k in reached]
@@ -197,7 +198,7 @@ class _BorderSearch:
         return changes.only(left), found[left]
 
     def follow_curves(self, most: int, progress: Progress) -> None:
-        """Follow the curves of the widest borders through the plane, until there are so many."""
+        """Follow the curves of the longest borders through the plane, until there are `most` of them."""
         cells = read_chart(self.chart)
         changes = changes_of(cells)
         bounds = [[float(values.min()), float(values.max())] for values in (cells.horizontal, cells.vertical)]

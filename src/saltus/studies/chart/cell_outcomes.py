@@ -1,4 +1,4 @@
-"""What there is in a cell of a chart."""
+"""What the motions in a cell of a chart end on."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def flags(kind: type[NumberedSentence]) -> dict[str, Any]:
 
 
 def outcomes(count: np.ndarray, unsettled: np.ndarray, verdict: np.ndarray) -> np.ndarray:
-    """What there is in cells with so many stable motions, so many starts that have not settled, and this verdict on these."""
+    """The `CellOutcome` of cells, from their numbers of stable motions and of unsettled starts, and the verdict on the latter."""
     outcome = np.where(count > 1, CellOutcome.SEVERAL_MOTIONS, np.where(count == 1, CellOutcome.ONE_MOTION, CellOutcome.REST))
     open_ = unsettled > 0
     chaotic = open_ & (verdict == Unsettled.CHAOTIC)

@@ -1,4 +1,4 @@
-"""The judgement of the motions of a chart's cells that have not settled: chaos, a transient, a long period, or undecided."""
+"""The judgement of the motions in a chart's cells that have not settled: chaos, a transient, a long period, or undecided."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ COMPANIONS = 6  # motions that are followed for each cell that is judged
 
 
 class CellVerdicts:
-    """The judgement of the motions that have not settled, an entry for each of `cell`; of `later`, cells (k,) and states (k, d),
-    on which such motions have settled after all."""
+    """The judgement of the motions that have not settled, an entry for each cell in `cell`.
+
+    `later` holds the cells (k,) and states (k, d) of motions on which companions have settled after all.
+    """
 
     def __init__(self, request: ChartRequest, motions: np.ndarray) -> None:
         motions = motions[np.argsort(motions["cell"], kind="stable")]
@@ -27,19 +29,20 @@ class CellVerdicts:
         found = judge_unsettled(request.system, states, parameters, settings=judgement(request.periods, request.tol))
         self.verdict, self.exponent, self.error = found.verdict.copy(), found.exponent, found.error
         longer = np.unique(found.settled.question[found.settled.period > request.max_period])
-        self.verdict[longer[self.verdict[longer] == Unsettled.TRANSIENT]] = Unsettled.PERIODIC  # on no known one
+        # A transient to an orbit of a longer period than the chart looks for leads to none of its motions.
+        self.verdict[longer[self.verdict[longer] == Unsettled.TRANSIENT]] = Unsettled.PERIODIC
         self.later = self.cell[found.settled.question], found.settled.state
 
         known = (found.period > 0) & (found.period <= request.max_period)
-        # These are among the motions of the cell after all, or come to rest.
+        # Such starts end on motions that the cell has through `later`, or come to rest.
         self.settles = (self.verdict == Unsettled.TRANSIENT) | ((self.verdict == Unsettled.PERIODIC) & known)
 
 
 def judgement(periods: int, tol: float) -> JudgementSettings:
-    """How long motions of a chart are followed that have not settled within so many forcing periods.
+    """The settings by which motions of a chart are judged that have not settled within so many forcing periods.
 
-    Of the thousands of cells of a chart each gets a few companions, and transients are excluded of a mean life up to eight times
-    the periods.
+    As a chart has thousands of cells, each gets a few companions only, and transients are excluded with mean lives up to eight
+    times the periods.
     """
     return JudgementSettings(
         companions=COMPANIONS,

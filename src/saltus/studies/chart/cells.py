@@ -30,21 +30,22 @@ class CellSettings:
 
     # Every other initial state lies in a smaller copy of the window, down to this share of its size: some motions are small.
     innermost: float = 1e-2
-    # Shares of the forcing periods after which motions that have come together go on as one.
+    # The stages in which motions are followed, as shares of the forcing periods: after each, motions that have come together are
+    # continued as one.
     stages: tuple[float, ...] = (1 / 20, 1 / 20, 1 / 10, 4 / 5)
-    # Up to this number of motions an ensemble gains little from having fewer, so that fewer stages are faster.
+    # An ensemble of up to this many motions is hardly faster with fewer motions, so that fewer stages take less time.
     few_motions: int = 500
     few_stages: tuple[float, ...] = (1 / 10, 9 / 10)
-    # The motions that are left in a cell after all stages are slow if they are few, while chaos leaves many. If they are at most
-    # `patient_with`, they are followed for `patience` times the forcing periods.
+    # If few motions are left in a cell after all stages they are slow, while chaos leaves many. If there are at most
+    # `patient_with` of them, they are followed for `patience` times the forcing periods.
     patience: int = 4
     patient_with: int = 3
-    negligible: float = 0.5  # Motions below this share of the least amplitude are not followed to where they settle.
-    # Motions fade whose amplitude in a forcing period is below this share of that in the period before: so do, under slow loads,
-    # those that come to rest, and small motions have thousands of impacts in a period.
+    negligible: float = 0.5  # Motions below this share of the least amplitude are not followed until they settle.
+    # A motion fades if its amplitude in a forcing period is below this share of that in the period before, as under slow loads if
+    # it comes to rest. It is not followed to its end: small motions have thousands of impacts in a period.
     fading: float = 0.5
-    kept: int = 9  # Stroboscopic states from which it is read where a motion is going: enough for orbits of one and two periods.
-    rounds: int = 400  # Rounds of starts from neighbours: more than the cells along a side of any chart.
+    kept: int = 9  # Stroboscopic states from which the limit of a motion is extrapolated: enough for periods 1 and 2.
+    rounds: int = 400  # The most rounds of starts from neighbours: more than the cells along a side of any chart.
 
 
 SETTINGS = CellSettings()
@@ -52,18 +53,18 @@ SETTINGS = CellSettings()
 
 @dataclass
 class CellOutcomes:
-    """The stable motions, each once, by cell and falling amplitude, and for each cell how many of the other starts ended how."""
+    """The stable motions, each once, by cell and falling amplitude, and the number of other starts of each cell by their ends."""
 
     motions: np.ndarray  # of dtype `motion_type`
-    captured: np.ndarray  # at rest, for all later loads
-    tiny: np.ndarray  # on motions smaller than those that count
-    unsettled: np.ndarray  # chaotic, slow, or of a longer period
-    ended: np.ndarray  # by a limit of the model
-    moving: np.ndarray  # of dtype `motion_type`: these motions, where they are at the end
+    captured: np.ndarray  # starts captured at rest, for all later loads
+    tiny: np.ndarray  # starts that end on motions too small to count
+    unsettled: np.ndarray  # starts of motions that are chaotic, slow, or of a longer period
+    ended: np.ndarray  # starts of motions that a limit of the model has ended
+    moving: np.ndarray  # of dtype `motion_type`: the unsettled motions in their last states
 
 
 def cells(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """The variables of a chart over a block of its plane, (rows, columns), and those of its motions with a last axis of 8.
+    """The variables of a chart over a block of its plane, (rows, columns), and those of its motions, (rows, columns, 8).
 
     A pure function of its arguments, as a sweep needs it: `arguments` are those of a `ChartRequest`, `block` holds the values
     along the two axes.
@@ -85,9 +86,9 @@ def computed(request: ChartRequest) -> tuple[dict[str, np.ndarray], np.ndarray]:
 
 
 def _verdicts(settled: CellOutcomes, judged: CellVerdicts) -> dict[str, np.ndarray]:
-    """The variables of a chart that follow from the judgement; starts that settle after all are counted no longer.
+    """The variables of a chart that follow from the judgement; starts that settle after all no longer count as unsettled.
 
-    Of those that a limit of the model has ended nothing more can be known.
+    Starts whose motions a limit of the model has ended do count, as it is not known where they would have gone.
     """
     unsettled, size = settled.unsettled.copy(), len(settled.unsettled)
     unsettled[judged.cell[judged.settles]] = 0
@@ -98,15 +99,15 @@ def _verdicts(settled: CellOutcomes, judged: CellVerdicts) -> dict[str, np.ndarr
 
 
 def beyond_limits(system: System, parameters: Mapping[str, np.ndarray], amplitude: np.ndarray) -> dict[str, np.ndarray]:
-    """Whether the largest motion of each cell goes beyond each limit that theory knows of the mechanism."""
+    """Whether the largest motion of each cell exceeds each limit of the mechanism that theory knows."""
     return {f"beyond_{limit.name}": amplitude > limit.value for limit in amplitude_limits(system, parameters)}
 
 
 def stable_motions(request: ChartRequest) -> tuple[CellOutcomes, CellVerdicts, np.ndarray]:
-    """What the starts in each cell settle on, the verdicts on what does not settle, and all motions, with those that starts from
-    neighbouring cells add.
+    """How the starts in each cell end, the verdicts on motions that do not settle, and all stable motions.
 
-    So every motion is followed through the chart to where its stability ends, however little it attracts there.
+    The last include those found by starts from motions of neighbouring cells. So every motion is followed through the chart to
+    where its stability ends, however small its basin is there.
     """
     states = starts(request.system, request.starts, request.window, request.seed)
     size = math.prod(request.shape)
@@ -118,7 +119,7 @@ def stable_motions(request: ChartRequest) -> tuple[CellOutcomes, CellVerdicts, n
 
 
 def spread(request: ChartRequest, new: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """The known motions of all cells with those that starts from new ones lead to in neighbouring cells, and from these again."""
+    """The known motions and those found by starting the new ones in neighbouring cells, again and again until none is added."""
     for _ in range(SETTINGS.rounds):
         cell, states = seeds(request.system, new, known, request.shape)
         if not len(cell):
@@ -138,7 +139,7 @@ def starts(system: System, count: int, window: Window, seed: int) -> np.ndarray:
 
 
 def settle(request: ChartRequest, cell: np.ndarray, states: np.ndarray, known: np.ndarray | None = None) -> CellOutcomes:
-    """Follow motions from states (n, d) at phase 0 in the cells of these numbers until they settle, or come to a known one."""
+    """Follow motions from states (n, d) at phase 0 in the cells of these numbers until they settle or reach a known motion."""
     total, least = math.prod(request.shape), request.least
     captured, tiny, unsettled, ended = (np.zeros(total, dtype=np.int64) for _ in range(4))
     record = motion_type(request.system.dimension)
@@ -155,7 +156,7 @@ def settle(request: ChartRequest, cell: np.ndarray, states: np.ndarray, known: n
         rests = outcome == Outcome.REST
         _count(captured, moving[rests])
         settled = moving["period"] > 0
-        # The first one that comes to rest in its cell shows that there is rest, however many impacts it takes.
+        # Until a motion of the cell has come to rest, fading motions are followed, to show that there is rest.
         size = np.where(settled | (captured[moving["cell"]] == 0), moving["amplitude"], fading)
         small = ~rests & (size < least * np.where(settled, 1.0, SETTINGS.negligible))
         found.append(moving[settled & ~small])
@@ -176,10 +177,10 @@ def _count(number: np.ndarray, motions: np.ndarray) -> None:
 
 
 def _followed(request: ChartRequest, motions: np.ndarray, periods: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The motions some forcing periods later, with the period of those that have settled, the `Outcome` of each, and the
-    amplitude in the last period of those that fade.
+    """The motions some forcing periods later, with the period of those that have settled; the `Outcome` of each; the amplitudes
+    as `_fading` gives them.
 
-    What is about to settle is put where it is going.
+    The state of a motion that is about to settle is replaced by its extrapolated limit.
     """
     motions = motions.copy()
     if not len(motions):
@@ -197,9 +198,9 @@ def _followed(request: ChartRequest, motions: np.ndarray, periods: int) -> tuple
         tol=request.tol,
     )
     going, state = ends, ends.last
-    if not request.system.model.held:  # what lies ahead in a straight line may lie beyond a contact
+    if not request.system.model.held:  # with several contacts or frictions an extrapolated state may lie beyond a contact
         ahead, period = approached(ends.states, request.max_period)
-        going = replace(ends, period=np.where(ends.unsettled, period, ends.period))  # its extrema are those of where it is going
+        going = replace(ends, period=np.where(ends.unsettled, period, ends.period))  # its extrema are those of the last period
         state = np.where(ends.unsettled[:, None], ahead, ends.last)
     high, low = going.highest, -going.lowest
     motions["slowest"] = 0.0 if ends.speeds is None else ends.slowest
@@ -209,9 +210,10 @@ def _followed(request: ChartRequest, motions: np.ndarray, periods: int) -> tuple
 
 
 def _fading(ends: Recurrence, amplitude: np.ndarray) -> np.ndarray:
-    """The amplitude in the last forcing period of motions that fade, and that of all periods which are kept of the others, (n,).
+    """The amplitude in the last forcing period for motions that fade, and over all periods that are kept for the others, (n,).
 
-    The smaller a bouncing motion becomes the more impacts it has in a period: a few such take longer than thousands of others.
+    The smaller a bouncing motion becomes the more impacts it has in a period: a few of these take longer than thousands of other
+    motions.
     """
     assert ends.extrema is not None
     if ends.extrema.shape[1] < 2:
@@ -221,7 +223,8 @@ def _fading(ends: Recurrence, amplitude: np.ndarray) -> np.ndarray:
 
 
 def joined(motions: np.ndarray) -> np.ndarray:
-    """The motions with those that have come together as one: in a cell, at the same phase, near to one another for their size."""
+    """The motions, of which those that have come together are joined to one: motions of one cell whose states at phase 0 are near
+    to one another relative to their size."""
     motions = motions[np.argsort(motions["cell"], kind="stable")]
     cell, state, amplitude = motions["cell"], motions["state"], motions["amplitude"]
     into = np.arange(len(motions))
@@ -230,7 +233,7 @@ def joined(motions: np.ndarray) -> np.ndarray:
         near &= cell[step:] == cell[:-step]
         into[step:] = np.where(near, np.minimum(into[step:], into[:-step]), into[step:])
     kept = into == np.arange(len(into))
-    while not kept[into].all():  # what came together with something that did itself
+    while not kept[into].all():  # a motion may be joined to one that is itself joined to another
         into = into[into]
     number = np.zeros(len(into), dtype=np.int64)
     np.add.at(number, into, motions["starts"])
@@ -239,12 +242,12 @@ def joined(motions: np.ndarray) -> np.ndarray:
 
 
 def _is_near(one: np.ndarray, other: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
-    """Whether states at the same phase are so near to one another that the motions end as one."""
+    """Whether states at the same phase are so near to one another that the motions end on the same motion."""
     return np.asarray(np.abs(one - other).max(axis=1) <= ALIKE.joined * amplitude)
 
 
 def _arrived(motions: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Which motions have come to one that their cell has already."""
+    """Which motions have reached a motion that their cell has already."""
     result = np.zeros(len(motions), dtype=bool)
     for there, index in motions_in(known, motions["cell"]):
         other = known[index]
@@ -253,9 +256,10 @@ def _arrived(motions: np.ndarray, known: np.ndarray) -> np.ndarray:
 
 
 def seeds(system: System, motions: np.ndarray, known: np.ndarray, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Further starts, as cells (n,) and states (n, d): the motions of neighbours that a cell has no motion alike to.
+    """Further starts, as cells (n,) and states (n, d): for each cell the motions of its neighbours to which none of its own is
+    similar.
 
-    The state is the neighbour's, or is extrapolated where the cell behind the neighbour has such a motion too.
+    The state is that in the neighbour or, if the cell behind the neighbour has a similar motion too, is extrapolated from both.
     """
     place = np.stack(np.unravel_index(motions["cell"], shape), axis=1)
     found = []
@@ -270,12 +274,13 @@ def seeds(system: System, motions: np.ndarray, known: np.ndarray, shape: tuple[i
 
 
 def _heading(motions: np.ndarray, known: np.ndarray, behind: np.ndarray) -> np.ndarray:
-    """The steps of states to those a cell further on, in a straight line from alike motions in the cells behind; else 0."""
+    """The steps from the states of motions to those expected a cell further on, (n, d): the differences to similar motions in the
+    cells behind, or 0 if there are none."""
     ahead = np.zeros_like(motions["state"])
     for there, index in motions_in(known, behind):
         other = known[index]
         like = there & is_alike(other, motions, ALIKE.alike)
         step = motions["state"] - other["state"]
-        like &= np.abs(step).max(axis=1) <= ALIKE.alike * motions["amplitude"]  # also at the same phase of several periods
+        like &= np.abs(step).max(axis=1) <= ALIKE.alike * motions["amplitude"]  # else it is in another of its forcing periods
         ahead[like] = step[like]
     return ahead

@@ -12,7 +12,8 @@ from saltus.studies.chart.motions import ALIKE, SIDES, motions_in, read_motions
 if TYPE_CHECKING:
     import xarray
 
-COUNTS = 1.2  # times the least amplitude: smaller motions may end in a cell because they are too small to count in the next
+# Changes are of motions above this many times the least amplitude: smaller ones may only be too small to count in the next cell.
+COUNTS = 1.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,9 +23,9 @@ class ChartMotions:
     horizontal: np.ndarray
     vertical: np.ndarray
     motions: np.ndarray  # of `motion_type`, by cell and falling amplitude
-    family: np.ndarray  # (n,): a number that motions share which have counterparts in neighbouring cells
-    least: float  # amplitude that counts
-    monostable: np.ndarray  # (rows, columns): rest is the only motion
+    family: np.ndarray  # (n,): the number of each motion's family: motions that are counterparts of each other from cell to cell
+    least: float  # the smallest amplitude that counts
+    monostable: np.ndarray  # (rows, columns): whether all motions come to rest
 
     @property
     def place(self) -> np.ndarray:
@@ -41,9 +42,9 @@ class ChartMotions:
 class Changes:
     """Where motions of a chart end: in `source` there is one that has no counterpart in the neighbour `target`."""
 
-    motion: np.ndarray  # (n,): which
-    source: np.ndarray  # (n, 2): row and column
-    target: np.ndarray
+    motion: np.ndarray  # (n,): the index of the motion in the chart's motions
+    source: np.ndarray  # (n, 2): row and column of its cell
+    target: np.ndarray  # (n, 2): row and column of the neighbour
 
     def only(self, chosen: np.ndarray) -> Changes:
         """Some of them."""
@@ -51,7 +52,7 @@ class Changes:
 
     @property
     def along(self) -> int:
-        """Along which axis the first of them lies: 0 horizontally, 1 vertically."""
+        """Along which axis the first change lies: 0 horizontally, 1 vertically."""
         return 0 if self.source[0, 0] == self.target[0, 0] else 1
 
     def __len__(self) -> int:
@@ -78,7 +79,7 @@ def monostable(chart: xarray.Dataset) -> xarray.DataArray:
 
 
 def _counterparts(motions: np.ndarray, shape: tuple[int, ...], side: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of motions (n, 2) that are counterparts in neighbouring cells, and which motions have none on this side."""
+    """Pairs of motions (n, 2) that are counterparts in neighbouring cells, and which motions have no counterpart on this side."""
     there = np.stack(np.unravel_index(motions["cell"], shape), axis=1) + side
     inside = ((there >= 0) & (there < shape)).all(axis=1)
     target = np.where(inside, there @ [shape[1], 1], -1)
@@ -94,7 +95,7 @@ def _counterparts(motions: np.ndarray, shape: tuple[int, ...], side: tuple[int, 
 
 
 def changes_of(chart: ChartMotions) -> Changes:
-    """Every end of a motion between two cells of a chart, but of those hardly large enough to count."""
+    """Every end of a motion between two cells of a chart, without motions that are hardly large enough to count."""
     counts, place = chart.motions["amplitude"] > COUNTS * chart.least, chart.place
     motion, target = [], []
     for side in SIDES:
@@ -106,7 +107,7 @@ def changes_of(chart: ChartMotions) -> Changes:
 
 
 def keys_of(chart: ChartMotions, changes: Changes) -> list[tuple[int, ...]]:
-    """What identifies changes: row and column, the motion's amplitude in nrad, row and column of the neighbour."""
+    """The keys of changes: row and column, the motion's amplitude in nrad, row and column of the neighbour."""
     size = np.rint(chart.motions["amplitude"][changes.motion] * 1e9).astype(int)
     rows = zip(changes.source, size, changes.target, strict=True)
     return [tuple(map(int, (*source, nrad, *target))) for source, nrad, target in rows]

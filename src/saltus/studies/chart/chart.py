@@ -55,10 +55,10 @@ def stability_chart(
 ) -> xarray.Dataset:
     """The largest amplitude of the stable motions beside rest, and their number, over the plane of two parameters (Figs. 14, 15).
 
-    In every cell motions are followed from `starts` initial states, spread evenly over the window and drawn in towards the
-    contact, and from every stable motion of the neighbouring cells of the same chunk, until that adds nothing new. So a motion
-    is followed to where its stability ends, even where next to nothing leads to it. Deformed equilibria, under no horizontal
-    load, are motions too. docs/charts.md lists the variables of the result.
+    In every cell motions are followed from `starts` initial states, spread evenly over the window, every other one drawn in
+    towards the contact, and from every stable motion of the neighbouring cells of the same chunk, until this adds nothing new. So
+    a motion is followed to where its stability ends, even where its basin is tiny. Deformed equilibria, which exist without a
+    horizontal load, are motions too. docs/charts.md lists the variables of the result.
 
     Parameters
     ----------
@@ -69,17 +69,17 @@ def stability_chart(
     paths
         The dotted paths of the parameters along them.
     max_period
-        The longest period of a motion, in forcing periods; what repeats later counts as unsettled.
+        The longest period of a motion, in forcing periods; motions of longer periods count as unsettled.
     starts, window, seed
         Initial states, as `search_orbits` takes them.
     least
         The smallest amplitude that counts: below Hcr small motions of 6, 10, 14, ... impacts accumulate towards rest.
     periods
-        Forcing periods after which a motion that has not settled counts as unsettled; by default what the damping takes.
+        Forcing periods after which a motion that has not settled counts as unsettled; by default it follows from the damping.
     tol
-        The error of a step; with larger ones than 1e-10 motions beside an equilibrium do not come to a halt.
+        The error of a step; with a larger one than 1e-10 motions beside an equilibrium do not come to a halt.
     rows
-        How many rows are one chunk, within which neighbours know of one another.
+        How many rows are one chunk; motions are carried on between neighbouring cells of one chunk only.
     store, workers, scheduler, progress
         Where the chunks are kept and who computes them, see `saltus.sweep.run`.
 
@@ -141,14 +141,14 @@ def bordered_chart(
     scheduler: str | None = None,
     progress: Progress = silent,
 ) -> xarray.DataTree:
-    """`stability_chart` with what bounds its motions (Figs. 14, 15).
+    """`stability_chart` with the exact borders of its motions (Figs. 14, 15).
 
     Parameters
     ----------
     system
         What moves, under a load with a frequency.
     curves
-        How many curves on which motions end are followed at most, see `with_borders`.
+        The largest number of curves that are followed on which motions end, see `with_borders`.
     horizontal, vertical, paths, max_period, starts, window, least, periods, tol, seed, rows, store, workers, scheduler
         As for `stability_chart`.
     progress

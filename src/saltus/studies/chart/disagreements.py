@@ -27,22 +27,22 @@ def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
     Parameters
     ----------
     chart
-        What `stability_chart` gave.
+        A chart as `stability_chart` or `with_borders` returns it.
     borders
-        Its borders, as `with_borders` gives them.
+        Its borders, as `with_borders` returns them.
 
     Returns
     -------
     xarray.Dataset
-        A Dataset with the changes along `change` of which it is not known what becomes of the motion, nor any curve explains
-        them: `horizontal` and `vertical` halfway between the cells, `amplitude` and `period` of the motion that ends, `cells` of
-        its family, whether the neighbour has rest alone, `beside_rest`; and along `unseen` the places on the curves of folds
-        beside which no cell has the motions that end there. The attributes: `changes` and `changes_beside_rest` count all that
-        there are, `located` those that end at an enclosed place, `on_curves` those that a curve explains; `sampled` how many of
-        the former were solved for by continuation, and `sampled_agree` how many of these lie where simulation has enclosed them;
-        `harmless` those where the same motion goes on, with another amplitude than expected or too small to count;
-        `chaos_beside_rest` counts pairs of neighbouring cells, one with rest alone and one with chaos alone, between which no
-        motion ends but chaos.
+        A Dataset. Along `change` it has the changes for which it is not known what becomes of the motion, and which no curve
+        explains: `horizontal` and `vertical` halfway between the cells, `amplitude` and `period` of the motion that ends, `cells`
+        (the number of motions in its family), and `beside_rest`, whether the neighbour has rest alone. Along `unseen` it has the
+        places on curves of folds beside which no cell has the motions that end there. Attributes: `changes` and
+        `changes_beside_rest` count all changes; `located` counts those with an enclosed end of the motion, `on_curves` those that
+        a curve explains, `harmless` those where the same motion goes on, with another amplitude than expected or too small to
+        count. `sampled` is the number of located ends that were also solved for by continuation, `sampled_agree` the number of
+        these that lie where simulation has enclosed them. `chaos_beside_rest` counts pairs of neighbouring cells, one with rest
+        alone and one with chaos alone, between which chaos ends but no stable motion.
 
     Examples
     --------
@@ -89,6 +89,6 @@ def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
 
 
 def _neighbours(some: np.ndarray, others: np.ndarray) -> int:
-    """How many pairs of neighbouring cells there are, one of each kind."""
+    """The number of pairs of neighbouring cells of which one is among `some` and the other among `others`."""
     pairs = ((some[1:], others[:-1]), (some[:-1], others[1:]), (some[:, 1:], others[:, :-1]), (some[:, :-1], others[:, 1:]))
     return int(sum((a & b).sum() for a, b in pairs))

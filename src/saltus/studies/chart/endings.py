@@ -1,7 +1,7 @@
 """What becomes of the motions of a chart between two neighbouring cells, found by simulation in lanes.
 
-A motion is followed from the middle of its cell towards that of the neighbour: where it settles as the same motion, it starts
-from there; where it does not, the way is halved. So many changes are looked into at once, and no orbit is solved for.
+A motion is followed in steps from the middle of its cell to that of the neighbour. If it settles as the same motion after a step,
+the next step begins there; if not, the step is halved. Many changes are looked into at the same time, and no orbit is solved for.
 """
 
 from __future__ import annotations
@@ -45,12 +45,13 @@ class ChangeOutcome(NumberedSentence):
 
 ENDS = (ChangeOutcome.JUMP, ChangeOutcome.DOUBLING, ChangeOutcome.SYMMETRY)
 
-SEEN = ("state", "period", "impact_count", "amplitude", "other", "slowest")  # of a motion on the way, as of one of a cell
+SEEN = ("state", "period", "impact_count", "amplitude", "other", "slowest")  # the fields of `motion_type` that `way_type` has too
 
 
 @cache
 def way_type(dimension: int) -> np.dtype[Any]:
-    """The record of a motion on the way: at which share of it, and what is seen of it; a period of 0 if it does not settle."""
+    """The record of a motion between two cells: the share of the way, and the motion there; its period is 0 if it does not
+    settle."""
     kept = motion_type(dimension)
     return np.dtype([("share", float), *((name, kept[name]) for name in SEEN)])
 
@@ -59,8 +60,8 @@ def way_type(dimension: int) -> np.dtype[Any]:
 def ending_type(dimension: int) -> np.dtype[Any]:
     """The record of what becomes of a motion with so many state variables.
 
-    The outcome, the last share of the way at which the motion has settled in time, the last at which it is the same motion,
-    settled or about to settle, and the next, at which it is another.
+    `outcome`; `settled`, the last share of the way at which the motion has settled in time; `last`, the motion at the last share
+    at which it is the same motion, settled or about to settle; `next`, the motion at the next share, at which it is another one.
     """
     way = way_type(dimension)
     return np.dtype([("outcome", np.int8), ("settled", float), ("last", way), ("next", way)])
@@ -70,26 +71,26 @@ def ending_type(dimension: int) -> np.dtype[Any]:
 class TraceSettings:
     """How changes are looked into in lanes."""
 
-    halvings: int = 6  # The end of a motion is enclosed in this power of a half of the way: 1/64 of a cell.
-    # From its own cell a motion starts without a second state to head on from, so that its basin is missed sooner: it is lost
-    # there only from so near.
+    halvings: int = 6  # The way is halved so often to enclose the end of a motion: to 1/64 of a cell.
+    # The first step from the middle of the motion's cell is halved so often before the motion counts as lost: its state cannot be
+    # extrapolated from two places yet, so that a longer step misses its basin more easily.
     first_halvings: int = 10
-    # Steps of a motion: far more than most take. Where its size changes much between two cells, steps are short, and many.
+    # The most steps of a motion, far more than most take. Where its size changes much between two cells, steps are short.
     rounds: int = 200
-    # A motion that is found again where it was lost from farther away is looked for within so many times the step that led there.
+    # If a motion is the same at a place where a longer step had lost it, the next steps are at most this many times the last one.
     stride: float = 4.0
-    # Shares of the forcing periods after which what is lost is not followed on, and what is about to settle is put where it is
-    # going.
+    # The stages in which motions are followed, as shares of the forcing periods: after each, motions that are lost are given up,
+    # and the state of a motion that is about to settle is replaced by its extrapolated limit.
     stages: tuple[float, ...] = (1 / 20, 1 / 20, 2 / 5)
-    # Up to this number of motions an ensemble takes longer to begin than to follow them all the way.
+    # With up to this number of motions, an ensemble takes longer to begin a stage than to follow them in one.
     few_motions: int = 16
     few_stages: tuple[float, ...] = (1 / 2,)
-    # States a number of periods apart that are as near as this share of the amplitude are of one motion that settles slowly, as
-    # it does beside its special point.
+    # A motion that returns within this share of its amplitude after some forcing periods has this period and settles slowly, as
+    # motions do near their special points.
     slow: float = 1e-3
     patience: int = 8  # A motion that reaches the neighbour but has not settled there is followed for so many times the periods.
-    # A motion is the same a step further on if its extrema have changed by less than this share of the amplitude for a step from
-    # cell to cell, and in shorter steps by the root of their length, as extrema change beside a fold.
+    # A motion is the same after a step from cell to cell if its extrema have changed by less than this share of the amplitude,
+    # and after a shorter step by less than this times the root of its length, as extrema change beside a fold.
     change: float = ALIKE.family
 
 
@@ -98,8 +99,7 @@ SETTINGS = TraceSettings()
 
 @dataclass(frozen=True, eq=False)
 class Ways:
-    """The ways along which motions are followed, n of them: parameters from one end to the other, and the motions at the
-    start."""
+    """The n ways along which motions are followed: the parameters at both ends, and the motions at the start."""
 
     system: System
     start: Mapping[str, np.ndarray]  # the parameters by dotted path, (n,), at the middle of the motions' cells
@@ -111,13 +111,13 @@ class Ways:
 
     @cached_property
     def captured(self) -> np.ndarray:
-        """(n,): the speeds below which capture is proved all along a way, nan where that is asked at each place."""
+        """(n,): the speeds below which capture is proved all along a way; nan where this is computed at each place instead."""
         return captured_between(self.system, self.start, self.end)
 
     def settled(self, rows: np.ndarray, last: np.ndarray, share: np.ndarray, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What the motions from states (n, d) at a share of these ways settle on, of `way_type`, and whether they have settled.
+        """The motions, of `way_type`, on which motions from states (n, d) at these shares of the ways settle; whether they have.
 
-        What has come far from the last motion is followed no further.
+        A motion that differs much from the last one is not followed further.
         """
         found, settled = np.zeros(len(rows), last.dtype), np.zeros(len(rows), dtype=bool)
         left = np.arange(len(rows))
@@ -130,7 +130,7 @@ class Ways:
         return found, settled
 
     def followed(self, rows: np.ndarray, motions: np.ndarray, periods: int) -> tuple[np.ndarray, np.ndarray]:
-        """Motions, of `way_type`, so many forcing periods later at the most, and whether they have settled."""
+        """The motions, of `way_type`, at most so many forcing periods later, and whether they have settled."""
         parameters = {path: a[rows] + motions["share"] * (self.end[path][rows] - a[rows]) for path, a in self.start.items()}
         ends = find_recurrence(
             self.system,
@@ -146,7 +146,7 @@ class Ways:
             tol=self.tol,
         )
         ahead = ends.last
-        if not self.system.model.held:  # what lies ahead in a straight line may lie beyond a contact
+        if not self.system.model.held:  # with several contacts or frictions an extrapolated state may lie beyond a contact
             ahead, _ = approached(ends.states, self.max_period)
         own = len(self.system.model.coordinates)
         size = np.nanmax(np.abs(ends.states[:, :, :own]), axis=(1, 2), initial=0.0)[:, None]
@@ -165,9 +165,9 @@ class Ways:
 
 
 def trace(ways: Ways, least: float) -> np.ndarray:
-    """What becomes of each motion on its way, of `ending_type`; `least` is the amplitude that counts.
+    """What becomes of each motion on its way, of `ending_type`; `least` is the smallest amplitude that counts.
 
-    That it is lost counts only from a place no farther than the last halving: from afar its basin may be too small.
+    A motion counts as lost only after a step as short as the last halving: a longer one may miss its basin.
     """
     count = len(ways.motions)
     result = np.zeros(count, ending_type(ways.system.dimension))
@@ -196,8 +196,10 @@ def trace(ways: Ways, least: float) -> np.ndarray:
 
 
 def _wait(ways: Ways, result: np.ndarray) -> None:
-    """Follow what has reached the neighbour without having settled there to where it settles; if that is something else, it is
-    what comes next."""
+    """Follow the motions that have reached the neighbour without settling there until they settle.
+
+    If one settles as another motion, this is its `next`, and its `last` share is the one at which it had settled.
+    """
     rows = np.flatnonzero((result["last"]["share"] >= 1.0) & (result["settled"] < 1.0))
     if not rows.size:
         return
@@ -209,8 +211,10 @@ def _wait(ways: Ways, result: np.ndarray) -> None:
 
 
 def _heading(system: System, last: np.ndarray, before: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """States (n, d) at these shares of the way, in a straight line through the last two; that of the last where these differ
-    much, as at another phase of several periods."""
+    """States (n, d) at these shares of the way, extrapolated along the line through the last two states.
+
+    Where these differ much, as they do when they are states in different forcing periods of one motion, the last one is taken.
+    """
     step, gone = last["state"] - before["state"], last["share"] - before["share"]
     usable = (gone > 0.0) & (np.abs(step).max(axis=1) <= ALIKE.alike * last["amplitude"])
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -226,7 +230,8 @@ def is_symmetric(motions: np.ndarray) -> np.ndarray:
 def is_near(last: np.ndarray, found: np.ndarray) -> np.ndarray:
     """Whether the extrema have changed by no more than those of one motion may in a step of this length.
 
-    So must the least speed of an impact, if their number is the same: one that appears at a grazing has none.
+    If the number of impacts is the same, their least speed must not have changed by more either. If it is not, the least speed is
+    not compared, as an impact that appears at a grazing begins without speed.
     """
     size = np.maximum(last["amplitude"], found["amplitude"])
     near = SETTINGS.change * np.sqrt(np.abs(found["share"] - last["share"]))

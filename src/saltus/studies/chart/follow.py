@@ -6,14 +6,14 @@ import numpy as np
 
 from saltus.orbits import Branch, SpecialPoint
 
-STABILITY_ENDS = ("LP", "PD", "BPC", "GR", "RL", "CH")  # kinds of special points; the last two are of orbits that rest
-AT_THE_END = 1e-6  # share of the way: a special point nearer than this to the end of a branch is its end
+STABILITY_ENDS = ("LP", "PD", "BPC", "GR", "RL", "CH")  # kinds of special points, the last two of resting orbits
+AT_THE_END = 1e-6  # a special point within this share of the branch's range from its end is its end
 
 
 def lost(branch: Branch) -> SpecialPoint | str:
     """The special point at which the orbits of a branch lose their stability, seen from its first point, or why there is none.
 
-    That is also where a family ends at an orbit that is its own image, at a grazing, or where it can rest no longer.
+    It may also be the end of the branch: an orbit that is its own mirror image, a grazing, or the end of a rest.
     """
     points = list(branch.points)
     unstable = [i for i, point in enumerate(points) if not point.orbit.stable and not point.orbit.grazes]

@@ -1,4 +1,4 @@
-"""The stable motions of the cells of a chart: one record for each, what makes two of them one, and their table in a Dataset."""
+"""The stable motions of the cells of a chart: the record of a motion, when two are the same, and their table in a Dataset."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from saltus.flow import state_names
 if TYPE_CHECKING:
     import xarray
 
-KEPT = 8  # motions of each cell that a chart keeps, the largest ones
+KEPT = 8  # the number of motions of each cell that a chart keeps, the largest ones
 SIDES = ((0, 1), (0, -1), (1, 0), (-1, 0))  # rows and columns to the neighbours of a cell
 
 
@@ -26,10 +26,11 @@ def motion_type(dimension: int) -> np.dtype[Any]:
             ("cell", np.int64),  # the cell's number, row by row
             ("starts", np.int64),  # how many initial states have led to it
             ("period", np.int64),  # forcing periods after which it repeats itself; 0 while it has not settled
-            ("impact_count", np.int64),  # impacts in them
-            ("amplitude", float),  # max abs of the coordinate, or of all of several
+            ("impact_count", np.int64),  # impacts in a period
+            ("amplitude", float),  # max abs of all coordinates
             ("other", float),  # the extremum on the other side, counted positive there; the amplitude if the motion is symmetric
-            # The least speed of an impact, of models with several contacts: between two stops all extrema are the same. Else 0.
+            # The least speed of an impact for models with several contacts, else 0: between two stops all motions have the same
+            # extrema.
             ("slowest", float),
             ("state", float, (dimension,)),  # coordinates and velocities at phase 0
         ]
@@ -40,13 +41,13 @@ def motion_type(dimension: int) -> np.dtype[Any]:
 class MotionTolerances:
     """By how much of their amplitude motions may differ."""
 
-    same: float = 1e-4  # Settled motions of a cell with extrema so near, or those of the mirror image, are one motion.
-    joined: float = 1e-2  # Motions of a cell whose states at the same phase are so near end on the same motion.
-    alike: float = 0.2  # A motion of a neighbouring cell is not tried in a cell that has one so near to it already.
-    family: float = 0.35  # Motions of neighbouring cells so near are one family; nothing changes between the cells.
-    symmetric: float = 2e-4  # A motion whose two extrema are so near is its own mirror image.
-    curve: float = 0.5  # The orbit on a curve and a motion that ends there: near a fold amplitudes change steeply.
-    followed: float = 1e-3  # The orbit followed into a cell is the motion there if their amplitudes are so near.
+    same: float = 1e-4  # Settled motions of a cell are one motion if their extrema, or those of the mirror image, differ by less.
+    joined: float = 1e-2  # Motions of a cell end on the same motion if their states at the same phase differ by less.
+    alike: float = 0.2  # A neighbour's motion is not tried in a cell that has one whose extrema differ by less.
+    family: float = 0.35  # Motions of neighbouring cells whose amplitudes differ by less are one family: no motion ends there.
+    symmetric: float = 2e-4  # A motion whose two extrema differ by less in size is its own mirror image.
+    curve: float = 0.5  # A motion may end in an orbit on a curve if their amplitudes differ by less: these are steep near a fold.
+    followed: float = 1e-3  # A motion that was followed into a cell is the cell's motion if their amplitudes differ by less.
 
 
 ALIKE = MotionTolerances()
@@ -61,7 +62,7 @@ def motions_in(motions: np.ndarray, cell: np.ndarray) -> Iterator[tuple[np.ndarr
 
 
 def is_same(one: np.ndarray, other: np.ndarray, tolerance: float = ALIKE.same) -> np.ndarray:
-    """Whether motions have the same period and the same extrema, so that they are one or mirror images."""
+    """Whether motions have the same period and the same extrema, so that they are one motion or mirror images."""
     same = one["period"] == other["period"]
     for name in ("amplitude", "other"):
         same &= np.abs(one[name] - other[name]) <= tolerance * other["amplitude"]
@@ -75,7 +76,7 @@ def is_alike(one: np.ndarray, other: np.ndarray, tolerance: float) -> np.ndarray
 
 
 def has_alike(known: np.ndarray, cell: np.ndarray, motions: np.ndarray, tolerance: float) -> np.ndarray:
-    """Whether these cells have a motion like each of these."""
+    """Whether each of the cells (n,) has a motion similar to the motion of the same index."""
     result = np.zeros(len(cell), dtype=bool)
     for there, index in motions_in(known, cell):
         result |= there & is_alike(known[index], motions, tolerance)
@@ -83,7 +84,7 @@ def has_alike(known: np.ndarray, cell: np.ndarray, motions: np.ndarray, toleranc
 
 
 def distinct(motions: np.ndarray) -> np.ndarray:
-    """Each motion of each cell once, and mirror images as one, by cell and falling amplitude."""
+    """The motions of each cell without duplicates and mirror images, by cell and falling amplitude."""
     motions = by_cell(motions)
     fresh = np.ones(len(motions), dtype=bool)
     for step in range(1, int(np.bincount(motions["cell"]).max(initial=0))):

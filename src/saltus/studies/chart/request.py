@@ -1,4 +1,4 @@
-"""What a stability chart is asked for: checked once, kept in a store as JSON, and given to whoever computes its cells."""
+"""The arguments of a stability chart: checked once, kept in a store as JSON, and given to the processes that compute cells."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from saltus.sweep import Plan, Variable
 
 CELLS = "saltus.studies.chart.cells:cells"
-MAX_PERIOD = 16  # forcing periods that an ensemble looks back for a recurrence
+MAX_PERIOD = 16  # the longest period that an ensemble recognises, in forcing periods
 NUMBERS = ("max_period", "starts", "least", "periods", "tol", "seed")
 
 
@@ -42,9 +42,9 @@ NUMBERS = ("max_period", "starts", "least", "periods", "tol", "seed")
 class DurationSettings:
     """How long a motion is given to settle where `periods` is not given."""
 
-    decay: float = 75.0  # A motion has settled, as a rule, once exp(-C tau / 2) has fallen to exp(-75).
-    fewest: int = 40  # With much damping, or at a low frequency, some motions need longer than that rule says.
-    most: int = 1200  # Without damping only impacts dissipate, and the rule gives no end.
+    decay: float = 75.0  # As a rule, a motion has settled once exp(-C tau / 2) has fallen to exp(-75).
+    fewest: int = 40  # With much damping, or at a low frequency, some motions need longer than by this rule.
+    most: int = 1200  # Without damping only impacts dissipate, and the rule gives an infinite time.
 
 
 DURATION = DurationSettings()
@@ -66,9 +66,9 @@ class ChartRequest:
     paths: tuple[str, str]
     max_period: int
     starts: int
-    window: Any  # None is the one around the contact
+    window: Any  # None: a window around the contact
     least: float
-    periods: Any  # None is what the damping of the model takes
+    periods: Any  # None: the time in which motions settle by the damping of the model
     tol: float
     seed: int
     rows: int = 1
@@ -114,7 +114,7 @@ class ChartRequest:
         return {self.paths[1]: vertical.ravel(), self.paths[0]: horizontal.ravel()}
 
     def to_arguments(self) -> dict[str, Any]:
-        """The request without its axes, as JSON has it."""
+        """The request without its axes, in types that can be written as JSON."""
         numbers = {name: getattr(self, name) for name in NUMBERS}
         named = {"system": self.system.to_json(), "paths": list(self.paths), "window": list(self.window)}
         return named | numbers | identity(self.system)
@@ -126,7 +126,7 @@ class ChartRequest:
         Raises
         ------
         ParameterError
-            Arguments that were made where the system has other equations, or saltus another version.
+            Arguments of a system with other equations than it has here, or of another version of saltus.
         """
         system, paths = System.from_json(arguments["system"]), tuple(arguments["paths"])
         check_provenance(arguments, system, "this chart")
@@ -135,7 +135,7 @@ class ChartRequest:
 
     @classmethod
     def of_chart(cls, system: System, chart: Any) -> ChartRequest:
-        """The request of which a chart is the answer."""
+        """The request that has led to a chart."""
         needed = ("vertical", "horizontal", "count", "amplitude"), ("window", "path", *NUMBERS)
         check_dataset(chart, "stability_chart", *needed, name="chart")
         attrs = chart.attrs
@@ -200,7 +200,7 @@ class ChartRequest:
 
 
 def _check_driven(system: Any) -> None:
-    """Refuse what has no chart."""
+    """Refuse systems that have no chart."""
     check_system(system, "stability_chart", several_contacts=True)
     if system.load.frequency is None:
         raise ParameterError("a stability chart needs a load with a frequency, Load(frequency=..., ...)", "load.frequency")
@@ -217,7 +217,7 @@ def _check_paths(system: System, paths: Any, axes: tuple[np.ndarray, np.ndarray]
 
 
 def periods_to_settle(system: System) -> int:
-    """Forcing periods in which motions settle that do, by the damping of the model."""
+    """The forcing periods in which motions settle as a rule, by the damping of the model."""
     damping, frequency = system.model.damping, system.load.frequency
     if not damping or not frequency:
         return DURATION.most

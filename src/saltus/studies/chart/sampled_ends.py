@@ -1,4 +1,4 @@
-"""A sample of the ends of a chart's motions, solved for by continuation: an independent check of those found by simulation."""
+"""A sample of the ends of a chart's motions, solved for by continuation: an independent check of the ends found by simulation."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from saltus.studies.chart.endings import ENDS
 from saltus.systems import System
 
 SAMPLE = 60  # ends that are solved for
-MARGIN = 0.02  # cells by which an end may lie beside its enclosure: a motion beside it settles slowly
+MARGIN = 0.02  # cells by which an end may lie outside its enclosure, as motions near their end settle slowly
 
 
 def sampled_ends(
     system: System, paths: tuple[str, str], chart: ChartMotions, borders: Borders, count: int = SAMPLE
 ) -> np.ndarray:
-    """For a sample of the motions that end between two cells, whether continuation of the orbit from the middle of the cell finds
-    its special point where simulation has enclosed it: 1, 0, or nan where it finds none, (n,)."""
+    """For a sample of the motions that end between two cells, (n,): 1 if continuation of the orbit from the middle of its cell
+    finds the special point where simulation has enclosed the end, 0 if elsewhere, nan if it finds none."""
     changes = changes_of(chart)
     found = borders.of(chart, changes)
     rows = np.flatnonzero(np.isin(found["outcome"], ENDS))

@@ -1,4 +1,4 @@
-"""The share of a chart's cells that are wrong, by a sample of them that is computed again with more starts on a finer grid."""
+"""The share of a chart's cells that are wrong, from a sample that is computed again with more starts and on a finer grid."""
 
 from __future__ import annotations
 
@@ -26,26 +26,29 @@ CHAOTIC = (CellOutcome.CHAOS, CellOutcome.MOTIONS_AND_CHAOS)
 
 @answered
 def wrong_cells(system: System, chart: xarray.Dataset, *, cells: int = 100, seed: int = 1) -> dict[str, float]:
-    """How many cells of a sample are wrong: cells at random are computed again with four times the starts, other ones, and beside
-    eight more cells about each, half as far away as its neighbours, so that motions which begin there are found.
+    """How many cells of a random sample are wrong.
+
+    Each cell is computed again with four times as many starts, which are others, and with eight cells around it at half the
+    distance of its neighbours, so that motions that begin at these are found as well.
 
     Parameters
     ----------
     system
-        That of the chart.
+        The system of the chart.
     chart
-        As `stability_chart` or `with_borders` returns it.
+        A chart as `stability_chart` or `with_borders` returns it.
     cells
-        How many cells the sample has; all of the chart's if it has no more.
+        The number of cells in the sample; all cells if the chart has fewer.
     seed
-        Of the sample and of the starts.
+        The seed of the sample and of the starts.
 
     Returns
     -------
     dict[str, float]
-        `checked_cells`; of these `wrong_cells`, which are `wrong_rest`, where the chart has rest alone and there is something
-        else, `wrong_motions`, where it lacks a stable motion, or `wrong_chaos`, where it has chaos and the sample none or the
-        other way round; and the `wrong_share` of the wrong ones with its 95 % interval, `wrong_share_low` to `wrong_share_high`.
+        The number of `checked_cells` and of `wrong_cells` among them. The latter are `wrong_rest` where the chart has rest alone
+        and there is something else, `wrong_motions` where it lacks a stable motion, and `wrong_chaos` where either the chart or
+        the sample has chaos, but not both. `wrong_share` is the share of wrong cells, and `wrong_share_low` to `wrong_share_high`
+        its 95 % interval.
 
     Examples
     --------
@@ -78,20 +81,20 @@ def wrong_cells(system: System, chart: xarray.Dataset, *, cells: int = 100, seed
 
 
 def _numbers(request: ChartRequest, seed: int) -> dict[str, Any]:
-    """The arguments of a chart with more starts, other ones."""
+    """The arguments of a chart with more and with other starts."""
     more = replace(request, starts=MORE * request.starts, seed=request.seed + seed)
     return {name: getattr(more, name) for name in more.__dataclass_fields__}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Sample(ChartRequest):
-    """Some cells of a chart, each in the middle of three rows and columns of cells half as far apart."""
+    """Some cells of a chart, each in the middle of a block of three by three cells half as far apart."""
 
     place: np.ndarray  # (n, 2): row and column in the chart
 
     @property
     def shape(self) -> tuple[int, int]:
-        """The rows of all of them below one another: what neighbours beyond these three add as starts does no harm."""
+        """All blocks below one another; starts from a neighbour that belongs to another block do no harm."""
         return 3 * len(self.place), 3
 
     @property

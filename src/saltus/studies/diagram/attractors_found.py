@@ -1,4 +1,4 @@
-"""The attractors that the simulation of a diagram has found: each once at each value, and where it stands with the branches."""
+"""The attractors that the simulation of a diagram has found, each once at each value, and whether they lie on branches."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from saltus.systems import System
 
 
 class Place(NumberedSentence):
-    """Where a simulated motion that repeats itself stands with the branches; its `str` is the sentence."""
+    """Whether a simulated periodic motion lies on a branch, or why not; its `str` is the sentence."""
 
     OPEN = 0, "it has not been looked at"
     ON_BRANCH = 1, "it lies on a stable part of a branch"
@@ -26,7 +26,7 @@ class Place(NumberedSentence):
     LEFT = 7, "it is stable in a small part of the range alone, and the effort follows no more of such"
 
 
-LONG = 6  # Motions of longer periods are many, and most attract little: those are followed on which random motions end.
+LONG = 6  # Orbits of longer periods are many, and most have small basins: only those on which random motions end are followed.
 
 
 @dataclass
@@ -34,11 +34,11 @@ class AttractorsFound:
     """All motions that were simulated, and the different attractors among them: each once at each value."""
 
     motions: SimulatedMotions
-    max_period: int  # the longest one that is followed
-    place: np.ndarray = field(init=False)  # (n,): a `Place` for each motion, kept up for `rows` alone
-    looked: np.ndarray = field(init=False)  # (n,): on how many branches, the first ones, a motion was looked for
+    max_period: int  # the longest period of orbits that are followed
+    place: np.ndarray = field(init=False)  # (n,): a `Place` for each motion, kept up to date for `rows` only
+    looked: np.ndarray = field(init=False)  # (n,): a motion was compared with so many branches, the first ones
     rows: np.ndarray = field(init=False)  # the first motion that was found on each attractor, by value
-    starts: np.ndarray = field(init=False)  # how many motions were found on each of these
+    starts: np.ndarray = field(init=False)  # how many motions were found on the attractor of each of these rows
     attractor: np.ndarray = field(init=False)  # (n,): the row of the attractor of each motion; its own where it has not settled
 
     def __post_init__(self) -> None:
@@ -55,7 +55,8 @@ class AttractorsFound:
         return len(self.rows) - before
 
     def _tell_apart(self) -> None:
-        """Find the attractors: motions at one value of one period and with the same extrema, or those of the mirror image."""
+        """Find the attractors: motions at one value are on one attractor if they have the same period and the same extrema, or
+        those of the mirror image."""
         rows = np.flatnonzero(self.motions.periodic)
         table = as_chart_motions(self.motions.only(rows))
         seen = (table[name] for name in ("other", "amplitude", "slowest", "period"))
@@ -74,11 +75,11 @@ class AttractorsFound:
 
     @property
     def open(self) -> np.ndarray:
-        """The rows of attractors of which it is not known yet where they stand."""
+        """The rows of attractors of which it is not known yet whether they lie on a branch."""
         return np.asarray(self.rows[self.place[self.rows] == Place.OPEN])
 
     def reopen(self, motions: np.ndarray) -> None:
-        """Motions of these rows end on attractors that are not rare, then."""
+        """Let attractors be followed that were taken as rare, as the random motions of these rows end on them."""
         ends = self.attractor[motions]
         self.place[ends[self.place[ends] == Place.RARE]] = Place.OPEN
 
@@ -88,7 +89,7 @@ class AttractorsFound:
         return np.asarray(self.rows[self.place[self.rows] != Place.ON_BRANCH])
 
     def families(self, rows: np.ndarray) -> list[np.ndarray]:
-        """The attractors of these rows in runs along the parameter, each of one kind; long runs first."""
+        """The attractors of these rows in runs along the parameter, each of similar motions; long runs first."""
         motions = self.motions.only(rows)
         table = as_chart_motions(motions)
         order = np.lexsort((motions.value, table["impact_count"], table["period"]))
@@ -97,16 +98,16 @@ class AttractorsFound:
         return sorted(runs, key=lambda run: -len(run))
 
     def seeds(self, system: System, grid: np.ndarray, known: np.ndarray, since: int) -> tuple[np.ndarray, np.ndarray]:
-        """Further starts, values (n,) and states (n, d): attractors, at neighbours of their value that have none alike.
+        """Further starts, values (n,) and states (n, d): attractors are started at the neighbouring values that have none alike.
 
         Parameters
         ----------
         system
             What moves.
         grid
-            The values whose neighbours are meant.
+            The values that have neighbours.
         known
-            Attractors that need no simulation, as records of a chart whose cells are the values of the grid.
+            Attractors that are known from branches, as records of a chart whose cells are the values of the grid.
         since
             Only attractors that were first found by the motion of this row, or later.
         """
@@ -119,7 +120,7 @@ class AttractorsFound:
 
 
 def as_chart_motions(motions: SimulatedMotions) -> np.ndarray:
-    """The motions as records of a chart, whose comparisons they share; all in the cell 0."""
+    """The motions as records of a chart, all in cell 0, so that they are compared by the same functions."""
     table = np.zeros(len(motions), motion_type(motions.last.shape[1]))
     for name in ("period", "impact_count", "amplitude", "slowest"):
         table[name] = getattr(motions, name)

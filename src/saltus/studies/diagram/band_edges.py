@@ -1,4 +1,4 @@
-"""What happens at the edges of bands of chaos: the branches of a diagram beside them tell."""
+"""What happens at the edges of bands of chaos, as the branches of the same diagram show it."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from saltus.systems import System, image_of
 
 @dataclass(frozen=True)
 class EdgeSettings:
-    """What is asked of the evidence for what happens at an edge."""
+    """When the evidence suffices to say what happens at an edge."""
 
-    # Largest distance of a fold or a grazing from the bracket of an edge, as a share of the range: half of the bracket's width.
+    # Largest distance of a fold or a grazing from the bracket of an edge, as a share of the range.
     beside: float = 1e-4
     # Largest distance, as a share of the range, of the period doubling of an orbit from the edge at which its cascade ends.
     cascade: float = 0.03
-    nearest: int = 4  # Number of the values next to an edge of which the first one with regular motion gives their period.
-    # Largest distance of the attractor from an unstable orbit that it touches, as a share of its size: chaos comes as near as
-    # its states are dense. Within the band the distance is to be `grown` times that at the edge, at a depth of this share of the
-    # range or the middle of the band: the orbits within the attractor are near to it everywhere.
+    nearest: int = 4  # The period of the motions beyond an edge is that at the first regular one of this many values next to it.
+    # The largest distance, as a share of the attractor's size, at which the attractor touches an unstable orbit: its states are
+    # no denser than that. Inside the band, at `depth` times the range from the edge or in the middle of a narrower band, it must
+    # be at least `grown` times as far away, as unstable orbits within the attractor are near to it everywhere.
     touch: float = 0.02
     grown: float = 3.0
     depth: float = 0.005
     longest_period: int = 3  # The longest period of unstable orbits that are compared, in forcing periods.
-    same_place: float = 1e-9  # Largest relative distance in the parameter at which an orbit is that of a special point.
-    periods: int = 400  # Forcing periods for which motions of the chaos are followed to know its states.
+    same_place: float = 1e-9  # An orbit is that of a special point if their parameters differ by no more than this, relatively.
+    periods: int = 400  # Forcing periods for which chaotic motions are followed to sample the attractor's states.
 
 
 SETTINGS = EdgeSettings()
@@ -41,10 +41,10 @@ SETTINGS = EdgeSettings()
 def explained(system: System, chaos: Bands, branches: Sequence[Branch]) -> Bands:
     """The bands with what happens at each edge, as far as the branches of the same diagram show it.
 
-    A fold or a grazing at which motions lose their stability, in the bracket of the edge, is what happens there. A cascade ends
-    where motions beyond have 2^k times, k > 0, the period of an orbit whose doubling lies on that side. At a crisis motions leave
-    the attractor beyond the edge, and the attractor, which is away from an unstable orbit within the band, touches it there: the
-    distance is that of its states at phase 0.
+    If a fold or a grazing at which orbits lose their stability lies in the bracket of the edge, it is what happens there. The
+    edge is the end of a cascade if the motions beyond it have 2^k times (k > 0) the period of an orbit whose period doubling lies
+    on that side. It is a crisis if the motions beyond are transients and the attractor, whose states at phase 0 are away from
+    the states of an unstable orbit within the band, comes up to them at the edge.
     """
     look = _Evidence(system, chaos, branches)
     bands = [replace(band, lower=look.of(band, band.lower), upper=look.of(band, band.upper)) for band in chaos.bands]
@@ -75,7 +75,7 @@ class _Evidence:
         return Unsettled(self.chaos.tried.verdict[np.searchsorted(self.chaos.tried.values, value)])
 
     def _special(self, edge: Edge) -> tuple[SpecialPoint | None, EdgeKind]:
-        """The special point that shows what happens at an edge, with what that is."""
+        """The special point that shows what happens at an edge, or None, and the kind of edge that it makes."""
         low, high, reach = min(edge.inner, edge.outer), max(edge.inner, edge.outer), SETTINGS.beside * self.span
         beside = [point for point in self.special if low - reach <= point.parameter <= high + reach]
         for code, kind in ((SpecialKind.LP, EdgeKind.FOLD), (SpecialKind.GR, EdgeKind.GRAZING)):
@@ -94,14 +94,15 @@ class _Evidence:
         return nearest, EdgeKind.CASCADE
 
     def _period_beyond(self, edge: Edge) -> int:
-        """The longest period of motions at the first of the nearest values beyond an edge at which they are regular."""
+        """The longest period of the motions at the nearest value beyond an edge at which they are regular; 0 if there is none."""
         tried, first = self.chaos.tried, int(np.searchsorted(self.chaos.tried.values, edge.outer))
         step = 1 if edge.outer > edge.inner else -1
         nearest = [i for i in range(first, first + SETTINGS.nearest * step, step) if 0 <= i < len(tried.values)]
         return next((int(tried.period[i]) for i in nearest if tried.verdict[i] == Unsettled.PERIODIC and tried.period[i] > 0), 0)
 
     def _touched(self, band: Band, edge: Edge) -> float:
-        """The distance of the attractor to the unstable orbit that it touches at an edge, and not within; nan without such."""
+        """The attractor's distance to the unstable orbit that it touches at an edge but not inside the band; nan if there is
+        none."""
         tried, span = self.chaos.tried, band.high - band.low
         toward = np.sign(edge.inner - edge.outer) * min(SETTINGS.depth * self.span, 0.5 * span)
         inside = np.flatnonzero(tried.chaotic & (tried.values >= band.low) & (tried.values <= band.high))
@@ -125,7 +126,8 @@ class _Evidence:
 
 
 def _distance(states: np.ndarray, branch: Branch, value: float) -> float:
-    """The least distance, by the size of the attractor, of its states to the unstable orbits of a branch; inf without these."""
+    """The least distance of an attractor's states to the unstable orbits of a branch, as a share of the attractor's size; inf if
+    there are no such orbits."""
     orbits = _unstable_at(branch, value)
     if not orbits:
         return np.inf
@@ -135,12 +137,12 @@ def _distance(states: np.ndarray, branch: Branch, value: float) -> float:
 
 
 def turning_points(branches: Sequence[Branch]) -> list[SpecialPoint]:
-    """The special points at which motions lose their stability or end: beside them some orbits are stable, not all."""
+    """The special points at which stable orbits lose their stability or end: those with stable orbits on one side only."""
     return [special for branch in branches for special in branch.special if _turns(branch, special)]
 
 
 def _turns(branch: Branch, special: SpecialPoint) -> bool:
-    """Whether stability changes, or ends with the branch, at a special point; orbits at the point itself do not count."""
+    """Whether stability changes at a special point, or a stable branch ends there; orbits at the point itself do not count."""
     away = np.abs(branch.parameters - special.parameter)
     apart = away + np.abs(branch.amplitudes - special.amplitude)
     nearest = int(apart.argmin())

@@ -1,4 +1,4 @@
-"""Bands of chaos along a parameter, as results: what became of motions at all values, the bands and their edges."""
+"""The bands of chaos along a parameter as a result: the verdict at each value, the bands and their edges."""
 
 from __future__ import annotations
 
@@ -44,11 +44,11 @@ class Tried:
 
     values: np.ndarray  # (n,)
     verdict: np.ndarray  # (n,): an `Unsettled`; PERIODIC also where all motions settle or rest
-    exponent: np.ndarray  # (n,): the largest one of what has not settled, else nan
+    exponent: np.ndarray  # (n,): largest Lyapunov exponent of the motions that have not settled, else nan
     error: np.ndarray  # (n,): half width of its 95 % interval
-    life: np.ndarray  # (n,): mean life of a transient in forcing periods; of chaos the one that is excluded with 95 %
-    period: np.ndarray  # (n,): the longest one of what settles, in forcing periods; 0 where nothing does
-    states: np.ndarray  # (n, k, d): stroboscopic states of what has not settled, else nan
+    life: np.ndarray  # (n,): mean life of a transient in forcing periods; of chaos the mean life that is excluded with 95 %
+    period: np.ndarray  # (n,): longest period of the motions that settle, in forcing periods; 0 where none settles
+    states: np.ndarray  # (n, k, d): stroboscopic states of the motions that have not settled, else nan
 
     @property
     def chaotic(self) -> np.ndarray:
@@ -78,7 +78,7 @@ class Band:
 
     lower: Edge
     upper: Edge
-    exponent: float  # the largest one found in it
+    exponent: float  # the largest Lyapunov exponent found in it
     error: float  # half width of its 95 % interval
 
     @property
@@ -117,7 +117,7 @@ class Bands(Result):
         return xarray.DataTree.from_dict({"/": root, **self.to_datasets()})
 
     def to_datasets(self) -> dict[str, xarray.Dataset]:
-        """`bands`, `exponents` (by value) and `stroboscopic` (states and peaks of what moves, a dot each)."""
+        """`bands`, `exponents` (by value) and `stroboscopic` (a dot for each state of the motions, with the peak around it)."""
         return {"bands": band_dataset(self.bands), "exponents": self._exponents(), "stroboscopic": self._stroboscopic()}
 
     def _exponents(self) -> xarray.Dataset:
@@ -169,7 +169,7 @@ def bands_of(tried: Tried) -> tuple[Band, ...]:
 
 
 def _edge(tried: Tried, inner: int, outer: int) -> Edge:
-    """The edge between two neighbouring values; the range may end at the inner one."""
+    """The edge between the last value with chaos and its neighbour without; the bound of the range if there is no neighbour."""
     value = float(tried.values[inner])
     if not 0 <= outer < len(tried.values):
         return Edge(value, value, EdgeKind.BOUND)
@@ -178,7 +178,7 @@ def _edge(tried: Tried, inner: int, outer: int) -> Edge:
 
 
 def band_dataset(bands: tuple[Band, ...] = ()) -> xarray.Dataset:
-    """The bands, a row each; both ends of each edge's bracket, and what happens there."""
+    """The bands, a row each, with both ends of the bracket of each edge and what happens at the edge."""
     import xarray
 
     columns: dict[str, Any] = {"kind": ("band", np.full(len(bands), "CH", dtype="U2"))}

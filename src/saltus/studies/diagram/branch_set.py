@@ -1,4 +1,4 @@
-"""The branches of one diagram: each orbit that is found is followed once, and so is what is born on its branch."""
+"""The branches of one diagram: each orbit that is found is followed once, and so are the families born on its branch."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ BRANCHING = (SpecialKind.PD, SpecialKind.BPC)  # at which other families are bor
 
 @dataclass(frozen=True)
 class BranchSettings:
-    """How far branches are followed, and which of those that are born on others."""
+    """How far branches are followed, and which of the branches that are born on others."""
 
-    # Along a frequency, families of longer periods are followed up to the range's upper end times this, as many of them close.
+    # Along a frequency, families of periods above 1 are followed up to this many times the upper bound, as many of them close.
     beyond_frequency: float = 20.0
-    beyond: float = 1.3  # Along any other parameter few of them close, and they are followed up to its upper end times this.
+    beyond: float = 1.3  # Along other parameters few of them close; they are followed up to this many times the upper bound.
     narrow: float = 0.02  # Branches born on one that covers less than this share of the range are not followed.
-    # Branches are not followed whose first orbit is smaller than this share of their parent's largest one: near rest a branch has
-    # endless special points, each of a smaller orbit than the one before.
+    # A branch is not followed if its first orbit is smaller than this share of its parent's largest orbit: near rest a branch has
+    # infinitely many special points, each at a smaller orbit than the one before.
     visible: float = 0.01
-    # The end of a branch is the special point of another one if parameters and amplitudes differ by no more.
+    # The end of a branch is the special point of another one if parameters and amplitudes differ by no more than this.
     same_place: float = 1e-6
-    # Step along the branch of a parent from the special point at which its family was met: at the point test functions vanish.
+    # Step along a parent's branch from the special point at which a family ends on it: at the point itself test functions vanish.
     beside: float = 1e-3
 
 
@@ -37,22 +37,22 @@ SETTINGS = BranchSettings()
 
 @dataclass
 class BranchSet:
-    """The branches known so far, and up to which period, how far and how finely they are followed."""
+    """The branches that are known so far; up to which period, how far and how finely branches are followed."""
 
     work: DiagramWork
     bounds: tuple[float, float]
     max_period: int
     step: float
     switch: bool
-    most: int  # with this number of branches, no more are followed that are born on others
+    most: int  # once there are this many branches, those born on others are not followed any more
     placed: list[PlacedBranch] = field(default_factory=list)
-    grown: set[int] = field(default_factory=set)  # the branches on which all that is born was followed
+    grown: set[int] = field(default_factory=set)  # the branches whose special points were followed up
     partial: set[int] = field(default_factory=set)  # the branches that were followed only while they are stable
     left: int = 0  # special points at which a family is born that is not followed
 
     def follow(self, orbit: PeriodicOrbit, while_stable: bool = False) -> None:
-        """Follow an orbit that lies on no known branch: only while it is stable, or all the way with the parents on whose
-        special points its branch ends."""
+        """Follow an orbit unless it lies on a known branch: either only while it is stable, or all the way, and then also the
+        parents' branches at whose special points its branch ends."""
         if while_stable and not self.knows(orbit):
             self.placed.append(PlacedBranch(self._continued(orbit, while_stable=True)))
             self.partial.add(id(self.placed[-1]))
@@ -61,11 +61,12 @@ class BranchSet:
             waiting += self._follow(waiting.pop(0))
 
     def prepare(self, orbits: Sequence[tuple[PeriodicOrbit, bool]]) -> None:
-        """Follow orbits that lie on no known branch at once, each whether it is while they are stable."""
+        """Compute the branches of orbits that lie on no known one at the same time; the second entry of each pair says whether
+        the orbit is followed only while it is stable."""
         self.work.prepare([self.request(orbit, stable) for orbit, stable in orbits if not self.knows(orbit)])
 
     def grow(self, progress: Progress) -> None:
-        """Follow what is born on the branches, on the widest first."""
+        """Follow the families that are born on the branches, those of the widest branch first."""
         while self.switch:
             widest = max((b for b in self._whole if id(b) not in self.grown), key=self._width, default=None)
             if widest is None:
@@ -76,12 +77,12 @@ class BranchSet:
 
     @property
     def branches(self) -> list[Branch]:
-        """The branches, in the order in which they were followed, without parts of others that were found later."""
+        """The branches, in the order in which they were followed, without those that turned out to be parts of others."""
         return [placed.branch for placed in self.placed if not (id(placed) in self.partial and self._is_part(placed.branch))]
 
     @property
     def _whole(self) -> list[Branch]:
-        """Those that were followed all the way."""
+        """The branches that were followed all the way."""
         return [placed.branch for placed in self.placed if id(placed) not in self.partial]
 
     def _is_part(self, branch: Branch) -> bool:
@@ -94,12 +95,12 @@ class BranchSet:
         return self.work.follow([self.request(orbit, while_stable)])[0][0]
 
     def request(self, start: PeriodicOrbit | SpecialPoint, while_stable: bool = False) -> Request:
-        """What is asked for to follow an orbit, or what is born at a special point."""
+        """The request for the branch of an orbit, or for the branches that are born at a special point."""
         period = _period_born(start) if isinstance(start, SpecialPoint) else start.period
         return Request(start, self._range(period), self.step, while_stable)
 
     def _follow(self, orbit: PeriodicOrbit) -> list[PeriodicOrbit]:
-        """Follow an orbit unless it lies on a known branch; returns orbits of the branches on which its own ends."""
+        """Follow an orbit unless it lies on a known branch; returns an orbit of each parent's branch on which its branch ends."""
         if self.knows(orbit):
             return []
         branch = self._continued(orbit)
@@ -108,11 +109,11 @@ class BranchSet:
         return [beside for special in specials if _is_parent(special, branch) for beside in _beside(special)]
 
     def _grow(self, branch: Branch) -> None:
-        """Follow all that is born on a branch."""
+        """Follow the families that are born on a branch."""
         narrow = self._width(branch) < SETTINGS.narrow * (self.bounds[1] - self.bounds[0])
         own = [special for special in filter(self._is_branching, branch.special) if not _is_parent(special, branch)]
         visible = {id(special): special.amplitude >= SETTINGS.visible * branch.amplitudes.max() for special in own}
-        if not narrow:  # a branch often ends at the next special point: every other one is followed ahead
+        if not narrow:  # a family often ends at the next special point, so only every other one is computed in advance
             ahead = [special for special in own if visible[id(special)] and not self._is_followed(special)]
             self.work.prepare([self.request(special) for special in ahead[: max(0, self.most - len(self.placed)) : 2]])
         for special in own:
@@ -134,12 +135,12 @@ class BranchSet:
         return any(placed.holds(orbit, value) for placed in self.placed)
 
     def _is_branching(self, special: SpecialPoint) -> bool:
-        """Whether orbits of at most the longest period are born at a special point within the bounds."""
+        """Whether a special point lies within the bounds, and orbits of at most the longest period are born at it."""
         inside = self.bounds[0] <= special.parameter <= self.bounds[1]
         return inside and special.kind in BRANCHING and _period_born(special) <= self.max_period
 
     def _born_at(self, special: SpecialPoint) -> list[Branch]:
-        """The branches that begin at a special point and are not known."""
+        """The branches that begin at a special point, without those that are known already."""
         born = self.work.follow([self.request(special)])[0]
         return [branch for branch in born if not self.knows(branch.points[len(branch.points) // 2].orbit)]
 
@@ -154,7 +155,7 @@ class BranchSet:
         return False
 
     def _range(self, period: int) -> tuple[float, float]:
-        """How far a family is followed: where the range ends, or beyond for those that may be loops."""
+        """The bounds within which a family is followed: those of the diagram or, if it may be a loop, with a higher upper one."""
         low, high = self.bounds
         reach = SETTINGS.beyond_frequency if self.work.path == "load.frequency" else SETTINGS.beyond
         return (low, high) if period == 1 else (low, max(high, reach * high))
@@ -172,12 +173,12 @@ def _meet(end: PeriodicOrbit, special: SpecialPoint) -> bool:
 
 
 def _is_parent(special: SpecialPoint, branch: Branch) -> bool:
-    """Whether a special point at a branch's end is one of the branch from which its orbits are born."""
+    """Whether a special point at the end of a branch belongs to the parent's branch, on which the branch is born."""
     inner = branch.points[len(branch.points) // 2].orbit
     return special.orbit.period < inner.period or (special.orbit.symmetric and not inner.symmetric)
 
 
 def _beside(special: SpecialPoint) -> list[PeriodicOrbit]:
-    """An orbit next to a special point on its own branch."""
+    """An orbit next to a special point, on the branch to which the point belongs; empty if there is none."""
     point = special.point.beside(SETTINGS.beside)
     return [] if point is None or not point.orbit.admissible else [point.orbit]

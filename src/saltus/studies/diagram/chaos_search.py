@@ -67,12 +67,13 @@ def chaotic_bands(
 ) -> Bands:
     """Where motions are chaotic along a parameter, first from `starts` states at each of `count` values.
 
-    Intervals between values are halved to a thousandth of the range where the motions at their ends differ or one of them is
-    chaotic; motions within begin on those at both ends, so that an attractor is followed however little it attracts. What has
-    not settled after 300 forcing periods is judged by `judge_unsettled`. The edges of bands, and of windows of periodic motion
-    within them, are then halved to brackets of 1e-4 of the range, with motions begun on the chaos of the inner side. Windows
-    narrower than a thousandth of the range are seen by chance only; attractors whose basins hold no start, and that end before
-    the next value, are not. `effort="quick"` halves to 4e-3 and 1e-3 of the range, and judges once; "thorough" to 5e-4 and 5e-5.
+    Where the motions at two neighbouring values differ, or are chaotic at one of them, the interval is halved, down to a
+    thousandth of the range. Motions at the new value begin on those at both ends, so that an attractor is followed however small
+    its basin is. Motions that have not settled after 300 forcing periods are judged by `judge_unsettled`. The edges of bands, and
+    of windows of periodic motion within them, are then enclosed in brackets of 1e-4 of the range, by motions begun on the chaos
+    of the inner side. Windows narrower than a thousandth of the range are found by chance only; an attractor is not found if its
+    basin contains no start and it ends before the next value. `effort="quick"` halves to 4e-3 and 1e-3 of the range and judges
+    once; "thorough" halves to 5e-4 and 5e-5.
 
     Parameters
     ----------
@@ -81,13 +82,13 @@ def chaotic_bands(
     path, bounds
         Dotted path of the parameter, and its range.
     count
-        Of values, evenly from the first bound to the last, at least 2.
+        Number of values, evenly spaced from bound to bound, at least 2.
     starts, window, seed
         Initial states, as `search_orbits` takes them.
     special
-        Special points of branches, beside which more is looked for.
+        Special points of branches, beside which motions are begun, as narrow bands begin there.
     effort
-        How finely bands are resolved, and how surely they are none of transients, see `Effort`.
+        How finely bands are resolved, and how surely transients are excluded, see `Effort`.
     progress
         Called with the fraction done.
 
@@ -115,9 +116,9 @@ def chaotic_bands(
 
 @dataclass
 class BandSearch:
-    """The search for bands of chaos between two values of a parameter, which knows all motions that it was shown and began.
+    """The search for bands of chaos between two values of a parameter; it remembers all motions that it was given or has begun.
 
-    `work` says who computes what takes long.
+    Long computations are done by `work`.
     """
 
     work: DiagramWork
@@ -126,11 +127,11 @@ class BandSearch:
     special: list[BandOrigin] = field(default_factory=list)  # by value
     places: list[SearchedValue] = field(default_factory=list)  # by value
     further: list[SimulatedMotions] = field(default_factory=list)
-    # Pairs of neighbouring values: motions were begun at the second one on the chaos of the first one.
+    # Pairs of neighbouring values: motions were begun at the second one from those at the first one.
     carried: set[tuple[float, float]] = field(default_factory=set)
 
     def look(self, begun: SimulatedMotions, special: Iterable[BandOrigin] = (), progress: Progress = silent) -> SimulatedMotions:
-        """Look where these motions and special points are, which it has not seen; returns the motions that it has begun."""
+        """Look for chaos from these new motions and beside these special points; returns the further motions that were begun."""
         known, fresh = len(self.further), list[BandOrigin]()
         for origin in special:
             if not self._is_known(origin):
@@ -148,7 +149,7 @@ class BandSearch:
         return further[0].joined(*further[1:]) if further else begun.only(slice(0))
 
     def _is_known(self, origin: BandOrigin) -> bool:
-        """Whether a special point is one that is known: that of a branch is found again on the one that is born at it."""
+        """Whether a special point is known already: one at which a branch is born is found on both branches."""
         near, same = self.settings.same * self.span, self.settings.same
         ends = (bisect_left(self.special, origin.value + side, key=lambda other: other.value) for side in (-near, near))
         return any(np.allclose(origin.state, other.state, rtol=0.0, atol=same) for other in self.special[slice(*ends)])
@@ -165,14 +166,14 @@ class BandSearch:
         return self.bounds[1] - self.bounds[0]
 
     def place(self, value: float) -> SearchedValue:
-        """What is known at a value; a new place where nothing is."""
+        """The entry of a value, a new one if the value was not tried before."""
         at = bisect_left(self.places, SearchedValue(value))
         if at == len(self.places) or self.places[at].value != value:
             insort(self.places, SearchedValue(value, chaos=np.empty((0, self.work.system.dimension))))
         return self.places[at]
 
     def follow(self, values: Sequence[float], starts: Sequence[np.ndarray], care: int = 0) -> None:
-        """Follow motions from states (n, d) of each value's own, and judge those that do not settle."""
+        """Follow motions from states (n, d), given for each value, and judge those that do not settle."""
         column = np.repeat(np.asarray(values, dtype=float), [len(states) for states in starts])
         if len(column):
             states = np.concatenate([some for some in starts if len(some)])
@@ -194,7 +195,10 @@ class BandSearch:
         self._judge(values, states.reshape(len(values), -1, states.shape[-1]), care)
 
     def _judge(self, values: np.ndarray, states: np.ndarray, care: int, earlier: Earlier | None = None) -> None:
-        """Judge what has not settled at these values, of which states (n, m, d) are given, and follow what then settles."""
+        """Judge the motions that have not settled, of which states (n, m, d) are given, one row for each value.
+
+        Motions on which companions have settled are then simulated too, and added to what is known.
+        """
         judged = self.work.judge(values, states, self.settings.judgements[care], earlier)
         for row, value in enumerate(values):
             self.place(float(value)).judge(judged, row, care)
@@ -211,7 +215,7 @@ class BandSearch:
             self.place(float(motions.value[i])).settle(*facts, motions.last[i])
 
     def beside_special_points(self, special: Sequence[BandOrigin]) -> None:
-        """Begin motions on the orbits of special points at values beside these, except within chaos that is known."""
+        """Begin motions from the orbits of special points, at values beside them, but not within chaos that is known."""
         chosen: list[BandOrigin] = []
         for origin in sorted(special, key=lambda origin: origin.value):
             if not chosen or origin.value - chosen[-1].value >= self.settings.spacing * self.span:
@@ -222,14 +226,14 @@ class BandSearch:
         self.follow([value for value, _ in inside], [np.array([state]) for _, state in inside])
 
     def _is_within_chaos(self, value: float) -> bool:
-        """Whether both values next to this one that were tried have chaos."""
+        """Whether there is chaos at both of the tried values next to this one."""
         at = bisect_left(self.places, SearchedValue(value))
         return 0 < at < len(self.places) and all(place.chaotic for place in self.places[at - 1 : at + 1])
 
     def refine(self) -> None:
         """Halve intervals and carry chaos to neighbouring values, until neither shows anything new.
 
-        All intervals and neighbours of a round are simulated together, as a few motions take nearly as long as many.
+        All motions of a round are simulated together, as a few motions take nearly as long as many.
         """
         while True:
             middles = [(a, b) for a, b in pairwise(self.places) if self._is_of_interest(a, b)]
@@ -243,9 +247,9 @@ class BandSearch:
                 self.follow([value for value, _ in pairs], [states for _, states in pairs], care)
 
     def _to_carry(self) -> list[tuple[SearchedValue, SearchedValue]]:
-        """Pairs of neighbouring values: motions that go on at the first one are to be continued at the second one.
+        """Pairs of neighbouring values of which only the first one `goes_on`: its motions are to be continued at the second one.
 
-        Where the outermost value has chaos, the end of the range becomes a value, too.
+        Where there is chaos at the outermost value, the end of the range becomes a value, too.
         """
         for bound, outermost in zip(self.bounds, (self.places[:1], self.places[-1:]), strict=True):
             if any(place.chaotic for place in outermost):
@@ -257,7 +261,7 @@ class BandSearch:
         return fresh
 
     def _is_of_interest(self, a: SearchedValue, b: SearchedValue) -> bool:
-        """Whether chaos may begin, end or pause between two neighbouring values, and they are not near to one another yet."""
+        """Whether chaos may begin, end or be interrupted between two neighbouring values that are not close to each other yet."""
         width = (b.value - a.value) / self.span
         if a.verdict is b.verdict is Unsettled.UNDECIDED:
             width /= self.settings.undecided
@@ -282,20 +286,21 @@ class BandSearch:
         return middle, np.concatenate(some) if some else np.empty((0, 0))
 
     def _care_between(self, a: SearchedValue, b: SearchedValue) -> int:
-        """The care with which chaos between two values is judged: where it has an edge, that which the edge asks for."""
+        """The care with which chaos between two values is judged: if there is an edge between them, the one that it needs."""
         return self._care_against(b if a.chaotic else a) if a.chaotic != b.chaotic else 0
 
     def _care_against(self, other: SearchedValue) -> int:
         """The care with which chaos next to a value without chaos is judged.
 
-        If the motions there are transients, it is the least care that excludes transients which live `longer` by that factor.
+        If the motions without chaos are transients, it is the least care that excludes mean lives `longer` times as long as
+        theirs.
         """
         life = self.settings.longer * other.life if other.verdict is Unsettled.TRANSIENT else 0.0
         judgements = self.settings.judgements
         return next((care for care, one in enumerate(judgements) if one.exposure >= 3.0 * life), len(judgements) - 1)
 
     def confirm(self) -> None:
-        """Judge the chaos that is doubtful with more care; where it turns out to be a transient, find the new edges."""
+        """Judge doubtful chaos with more care; where it turns out to be a transient, find the new edges of the band."""
         for _ in range(self.settings.confirmations):
             failed = [place for care, places in self._doubtful().items() for place in self._confirm(places, care)]
             if not failed:
@@ -306,10 +311,11 @@ class BandSearch:
     def _doubtful(self) -> dict[int, list[SearchedValue]]:
         """The values whose chaos is doubtful, by the care with which it is to be judged.
 
-        Settling is a Poisson process, so the forcing periods in which nothing has settled add up over neighbouring values. In
-        each stretch of a band they are to be as many as the second judgement asks for; if they are fewer, its middle is judged
-        anew. So it is for the narrow parts of a band in which some motions settle, which may be windows with long transients.
-        The values at edges are judged as `_care_against` says, and those at which some companions have settled with more care.
+        Settling is a Poisson process, so the forcing periods in which no companion settles add up over neighbouring values. If in
+        a stretch of a band they are fewer than the second judgement asks for, the value in the middle is judged again. The same
+        holds for narrow parts of a band in which some motions settle: these may be windows with long transients. The last value
+        with chaos at an edge is judged with the care that `_care_against` gives, and a value at which some companions have
+        settled with the next higher care.
         """
         runs, doubtful = self._runs(), dict[int, list[SearchedValue]]()
         enough = self.settings.judgements[min(1, len(self.settings.judgements) - 1)].exposure
@@ -323,7 +329,7 @@ class BandSearch:
         return doubtful
 
     def _confirm_near(self, failed: list[SearchedValue]) -> None:
-        """Judge the nearest chaos beside values that turned out to have none, and go on where that fails as well."""
+        """Judge the nearest chaos beside values that turned out to have none; where this chaos fails too, go on outwards."""
         for care in {place.care for place in failed}:
             beside, reach = [place.value for place in failed if place.care == care], self.settings.near
             while beside:
@@ -338,7 +344,7 @@ class BandSearch:
         return [(a, b) for a, b in pairs if a.chaotic and not b.chaotic]
 
     def _confirm(self, places: Iterable[SearchedValue], care: int) -> list[SearchedValue]:
-        """Judge chaos with more care where that has not been done; returns where there is none after all."""
+        """Judge chaos with this care where that has not been done; returns the values at which there is none after all."""
         care = min(care, len(self.settings.judgements) - 1)
         doubtful = list({place.value: place for place in places if place.chaotic and place.care < care}.values())
         for size in {len(place.chaos) for place in doubtful}:
@@ -348,7 +354,7 @@ class BandSearch:
         return [place for place in doubtful if not place.chaotic]
 
     def _runs(self) -> list[list[SearchedValue]]:
-        """Successive places with chaos."""
+        """The runs of successive values with chaos."""
         runs: list[list[SearchedValue]] = [[]]
         for place in self.places:
             if place.chaotic:
@@ -358,12 +364,12 @@ class BandSearch:
         return [run for run in runs if run]
 
     def _stretches(self, run: list[SearchedValue]) -> list[list[SearchedValue]]:
-        """The parts of a band that are judged as one, of equal numbers of values."""
+        """The parts of a band whose values are judged together, with about equal numbers of values."""
         count = 1 + int((run[-1].value - run[0].value) / (self.settings.every * self.span))
         return [part.tolist() for part in np.array_split(np.array(run, dtype=object), min(count, len(run)))]
 
     def _beside_windows(self, run: list[SearchedValue]) -> list[list[SearchedValue]]:
-        """The narrow parts of a band in which some motions settle, each on orbits of one period with one number of impacts."""
+        """The narrow parts of a band in which some motions settle, a part for each period and number of impacts."""
         extents: dict[tuple[int, int], list[SearchedValue]] = {}
         for place in run:
             for kind in place.kinds:
@@ -388,7 +394,7 @@ class BandSearch:
 
 
 def _some(settled: SettledLater, most: int) -> SettledLater:
-    """A few of the motions of each question, those of different periods first."""
+    """At most half of `most` motions of each period, for each question."""
     order = np.lexsort((settled.state[:, 0], settled.period, settled.question))
     kept: list[int] = []
     counts: dict[tuple[int, int], int] = {}

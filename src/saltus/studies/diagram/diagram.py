@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class WorkShares:
-    """The share of the work that is done after each part."""
+    """The share of the whole work that is done once each of its parts is."""
 
     search: float = 0.2
     branches: float = 0.6
@@ -94,12 +94,13 @@ def bifurcation_diagram(
 ) -> xarray.DataTree:
     """All branches of periodic orbits along a parameter that a simulation finds, and bands of chaos (Figs. 11 to 13).
 
-    One simulation is used for everything, from states spread over a window at many values of the parameter, and from the motions
-    of neighbouring values until nothing new is found. What settles is followed unless a branch goes through it; what does not is
-    judged to be chaotic, or left undecided. Then random motions say what share of the states ends on something that the diagram
-    does not have; what they show is followed as well. Orbits of up to `repelling` forcing periods that repel, and what is born at
-    every PD and BPC, are followed besides, those of more than one forcing period beyond the bounds, to where they close or end.
-    Every orbit is confirmed by the event-driven flow over a period, stable ones over 20.
+    Motions are simulated from states spread over a window at many values of the parameter, then from the motions at neighbouring
+    values, until nothing new is found. The orbits on which they settle are followed, unless a branch goes through them already;
+    motions that do not settle are judged by `judge_unsettled`. Unstable orbits of up to `repelling` forcing periods, and the
+    families that are born at every PD and BPC, are followed as well; families of more than one forcing period also above the
+    upper bound, where many of them close. At last random motions estimate the share of the states that end on something that the
+    diagram lacks, and the orbits on which they settle are followed too. Every orbit is confirmed by the event-driven flow over a
+    period, stable ones over 20.
 
     Parameters
     ----------
@@ -108,20 +109,22 @@ def bifurcation_diagram(
     path, bounds, effort
         Dotted path of the parameter, its range, and how much is tried, see `Effort`.
     max_period
-        The longest period, in forcing periods, that is followed; of those beyond 6 only what random motions end on, while it
-        is stable.
+        The longest period of orbits that are followed, in forcing periods. Orbits of more than 6 are followed only if random
+        motions end on them, and only while they are stable.
     values
-        Where is simulated, by default evenly, as many as the effort says. If given, what is random is not followed.
+        Values at which motions are simulated; by default evenly spaced, as many as the effort says. If they are given, the orbits
+        on which random motions settle are not followed.
     starts, window, seed
-        How many initial states at each value, by default as the effort says, where, and their seed.
+        How many initial states there are at each value, by default as the effort says; the window in which they lie; their seed.
     repelling, switch
-        Up to which period repelling orbits are searched for; whether what is born at special points is.
+        The longest period of repelling orbits that are searched for; whether the families born at special points are followed.
     step, bands
         The longest step along a branch; whether chaos is looked for.
     store
-        Where all that takes long is kept, so that a search that was stopped, or one of more values or starts, goes on.
+        Folder in which all that takes long is kept, so that a search that was stopped goes on, and one with more values or starts
+        computes only what is new.
     workers, scheduler, progress
-        Who computes it, and what is told of it, see `saltus.sweep.run`.
+        Who computes, and how progress is reported, see `saltus.sweep.run`.
 
     Returns
     -------
@@ -158,8 +161,8 @@ def bifurcation_diagram(
 
 
 def _search(search: DiagramSearch, repelling: int, bands: bool, follow: bool, progress: Progress) -> None:
-    """Simulate, and follow what that shows, what repels, what is born on these, what motions from neighbouring values add, and
-    what settles in bands of chaos; then see what random motions end on, and `follow` it."""
+    """Simulate; follow the orbits that this shows, the repelling ones, the families born on their branches, the orbits that
+    motions from neighbouring values add, and those in windows of chaos. Then see what random motions end on, and `follow` it."""
     search.simulate(part_of(progress, 0.0, SHARES.search, "searching"))
     following = part_of(progress, SHARES.search, SHARES.branches)
     search.follow(following)
@@ -235,7 +238,7 @@ def response_spectrum(
 
 
 def _values(bounds: tuple[float, float], values: Iterable[float] | None, count: int) -> np.ndarray:
-    """The values at which motions are simulated, in order: those given, all within the bounds, or so many from bound to bound."""
+    """The values at which motions are simulated, in order: those given, or `count` values from bound to bound."""
     if values is None:
         return np.linspace(*bounds, count)
     grid = as_numbers(values)

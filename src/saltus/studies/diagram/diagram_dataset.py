@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 class ConfirmationSettings:
     """What direct simulation must show of an orbit."""
 
-    distance: float = 1e-8  # The distance within which a stable orbit must stay where it is.
-    rounds: int = 20  # The number of its periods for which it must.
-    instants: int = 64  # The number of instants of a period at which an orbit that rests is compared with itself.
+    distance: float = 1e-8  # A stable orbit must come back to itself within this distance ...
+    rounds: int = 20  # ... after this number of its periods.
+    instants: int = 64  # The number of instants of a period at which a resting orbit is compared with itself.
 
 
 CONFIRMATION = ConfirmationSettings()
@@ -68,22 +68,23 @@ def diagram_tree(search: DiagramSearch, **facts: Any) -> xarray.DataTree:
 
 
 def _effort(search: DiagramSearch) -> dict[str, Any]:
-    """How much was tried, as attributes: of the search for chaos the shares of the range to which it went."""
+    """How much was tried, as attributes; of the search for chaos only the shares of the range down to which it halved."""
     tried, chaos = asdict(search.effort), search.effort.chaos
     del tried["chaos"]
     return tried | {"chaos_step": chaos.step, "chaos_edge": chaos.edge}
 
 
 def _limits(system: System, path: str, bounds: tuple[float, float]) -> list[float]:
-    """The amplitudes that motions of the mechanism do not pass, rad; none where they vary with the parameter of the diagram."""
+    """The amplitudes that motions of the mechanism cannot exceed, rad; none if they vary with the parameter of the diagram."""
     low, high = ([float(limit.value) for limit in amplitude_limits(system, {path: value})] for value in bounds)
     return low if low == high else []
 
 
 def confirmed(branches: list[Branch], work: DiagramWork) -> list[xarray.Dataset]:
-    """The datasets of branches with their orbits' distances from themselves by direct simulation (`kept`: 20 periods, if stable).
+    """The datasets of branches, with the distance by which simulated orbits miss themselves: `defect` after one period, `kept`
+    after 20 periods, for stable orbits.
 
-    An orbit that its multipliers call stable, but that does not stay where it is, is not called so; `unconfirmed` counts these.
+    An orbit with stable multipliers whose motion does not stay on it is not called stable; `unconfirmed` counts these.
     """
     found = [branch.to_xarray() for branch in branches]
     ends = np.cumsum([0, *(len(branch.orbits) for branch in branches)])
@@ -103,7 +104,7 @@ def confirmed(branches: list[Branch], work: DiagramWork) -> list[xarray.Dataset]
 
 
 def _distances(orbits: list[PeriodicOrbit], rounds: int, work: DiagramWork) -> np.ndarray:
-    """The distance of each orbit from itself after `rounds` of its periods, by the event-driven flow: all at once in lanes."""
+    """The distance of each orbit from itself after `rounds` of its periods, by the event-driven flow, all orbits in lanes."""
     result = np.empty(len(orbits))
     rests = np.array([isinstance(orbit, RestingOrbit) for orbit in orbits], dtype=bool)
     result[rests] = [_moved(orbit, rounds) for orbit in orbits if isinstance(orbit, RestingOrbit)]
@@ -114,7 +115,7 @@ def _distances(orbits: list[PeriodicOrbit], rounds: int, work: DiagramWork) -> n
 
 
 def _moved(orbit: RestingOrbit, rounds: int) -> float:
-    """The largest distance, at 64 instants of a period: at the release itself all orbits that rest are in the same state."""
+    """The largest distance at 64 instants of a period: at one instant, the release, all resting orbits are in the same state."""
     motion = orbit.motion((rounds + 1) * orbit.period)
     times = motion.start + orbit.duration * (np.arange(CONFIRMATION.instants) + 0.5) / CONFIRMATION.instants
     now, later = motion.at(times), motion.at(times + rounds * orbit.duration)
@@ -122,7 +123,8 @@ def _moved(orbit: RestingOrbit, rounds: int) -> float:
 
 
 def _attractors(search: DiagramSearch) -> xarray.Dataset:
-    """What motions settled on at the values of the grid, a dot for each attractor that is followed."""
+    """The attractors on which motions settled at the values of the grid, a dot each, without those of long periods that are not
+    followed."""
     found = search.found
     left = np.isin(found.place[found.rows], (Place.LONGER, Place.RARE))
     shown = np.isin(found.motions.value[found.rows], search.grid) & ~left
@@ -164,7 +166,7 @@ def _dots(search: DiagramSearch, rows: np.ndarray) -> xarray.Dataset:
 
 
 def _searched(search: DiagramSearch) -> xarray.Dataset:
-    """The values at which motions were simulated, and how many of those from the starts there led to no orbit."""
+    """The values of the grid, and how many of the motions from the starts there settled on no periodic orbit, and why."""
     import xarray
 
     first = search.found.motions.only(slice(0, len(search.grid) * search.effort.starts))

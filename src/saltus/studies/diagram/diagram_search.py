@@ -29,13 +29,13 @@ from saltus.window import Window
 class DiagramSearchSettings:
     """How the search of a diagram goes on from what it has found."""
 
-    # Motions that simulation shows to be stable in less than this share of the range are followed only while they are stable:
-    # there is no end of them in chaos, and each has long unstable parts.
+    # Orbits that simulation shows to be stable in less than this share of the range are followed only while they are stable:
+    # within chaos there are any number of them, and each branch has long unstable parts.
     narrow: float = 0.02
-    rounds: int = 100  # Rounds of starts from neighbours: each adds what the one before has found a value further.
+    rounds: int = 100  # Rounds of starts from neighbours: each carries the motions that the last one found to the next values.
     transient: int = 24  # Forcing periods at the beginning of motions in which near returns are looked for.
-    # Where a stable part of a branch ends, motions are started from its last orbit, these shares of the range further on both
-    # sides: what they fall to is there where no start of the grid may lead.
+    # Where a stable part of a branch ends, motions are started from its last orbit at values that differ by these shares of the
+    # range, on both sides: they may fall to attractors to which no start of the grid leads.
     beyond: tuple[float, ...] = (3e-5, 3e-4)
 
 
@@ -46,10 +46,10 @@ SETTINGS = DiagramSearchSettings()
 class MissedShare:
     """The share of states that end on something which is not in the diagram, estimated by a sample of them."""
 
-    missed: int = 0  # motions of the sample that do
+    missed: int = 0  # motions of the sample that end on such a thing
     sample: int = 0
     samples: int = 0  # how many samples were tried; this is the last one
-    ended: int = 0  # motions of the sample that a limit of the model ends: it is not known where they would have gone
+    ended: int = 0  # motions of the sample that a limit of the model ends, so that it is not known where they would have gone
 
     @property
     def share(self) -> float:
@@ -78,12 +78,12 @@ class DiagramSearch:
     seed: int
     effort: EffortSettings
     branches: BranchSet
-    max_period: int  # the longest one that is followed
+    max_period: int  # the longest period of orbits that are followed
     found: AttractorsFound = field(init=False)
     band_search: BandSearch | None = None
     chaos: Bands | None = None
     missed: MissedShare = field(default_factory=MissedShare)
-    prepared: set[int] = field(default_factory=set)  # rows of motions that were followed with others at once
+    prepared: set[int] = field(default_factory=set)  # rows of motions whose branches were computed at once with others
 
     def simulate(self, progress: Progress = silent) -> None:
         """The simulation of the diagram: motions from the starts at every value of the grid."""
@@ -107,11 +107,11 @@ class DiagramSearch:
 
     @cached_property
     def mirrored(self) -> bool:
-        """Whether mirror images are motions too."""
+        """Whether the mirror image of a motion is a motion too."""
         return keeps_symmetry(self.system, self.path)
 
     def follow(self, progress: Progress) -> None:
-        """Follow what was simulated and lies on no branch, again and again until nothing of it is left to try."""
+        """Follow the attractors that were simulated and lie on no branch, until none is left that was not tried."""
         while True:
             self._place()
             rows = self.found.open
@@ -131,7 +131,7 @@ class DiagramSearch:
                 progress(known / (known + len(rows)), f"following, branches: {known}")
 
     def _place(self) -> None:
-        """Look for all attractors that lie on no branch on the branches on which they were not looked for yet."""
+        """Compare the attractors that lie on no branch so far with the branches that are new to them."""
         rows, count = self.found.unplaced, len(self.branches.placed)
         rows = rows[(self.found.place[rows] != Place.LONGER) & (self.found.looked[rows] < count)]
         for first in np.unique(self.found.looked[rows]).tolist():
@@ -144,20 +144,20 @@ class DiagramSearch:
         return bool(placed(self.found.motions.only([row]), branches, self.mirrored)[0])
 
     def _is_partial(self, run: np.ndarray) -> bool:
-        """Whether motions of a run are followed only while they are stable: those of long periods, and those that are so in a
-        small part of the range alone, as far as simulated values show."""
+        """Whether the orbits of a run are followed only while they are stable: those of long periods, and those that are stable
+        in a small part of the range only, as far as the simulated values show."""
         if self.found.motions.period[run[0]] > LONG:
             return True
         values, least = self.found.motions.value[run], SETTINGS.narrow * (self.bounds[1] - self.bounds[0])
         gap = np.diff([self.bounds[0], *self.grid, self.bounds[1]]).max()
-        if not np.isin(values, self.grid).any():  # found where chaos was looked for, whose values are nearer to one another
+        if not np.isin(values, self.grid).any():  # found by the search for chaos, whose values are denser than the grid
             gap = min(gap, 0.25 * least)
         return bool(np.ptp(values) + 2.0 * gap < least)
 
     def _prepare(self, runs: list[np.ndarray]) -> None:
-        """Follow the first of some runs of motions and others at once that are hardly on the same branch.
+        """Compute the branch of the first run, and at the same time branches of later runs, which hardly lie on the same branch.
 
-        Of motions that are stable in a wide range one of each period is taken, as two such may well be on one branch.
+        Of the runs that are stable in a wide range one of each period is taken, as two of one period may well be on one branch.
         """
         if self.work.at_once == 1 or _middle(runs[0]) in self.prepared:
             return
@@ -190,7 +190,10 @@ class DiagramSearch:
         return Place.ELSEWHERE if orbit.stable else Place.UNSTABLE
 
     def repel(self, max_period: int) -> None:
-        """Follow repelling orbits near which motions return, at some values of the grid: in chaos there is no end of them."""
+        """Follow repelling orbits to which motions come near and near which they return, at some values of the grid.
+
+        Their number is limited, as chaos contains any number of them.
+        """
         grid = self.grid[np.unique(np.linspace(0, len(self.grid) - 1, self.effort.repelling_values).astype(int))]
         begin = starts_at(self.system, grid, self.effort.starts, self.window, self.seed)
         columns = {self.path: np.repeat(grid, self.effort.starts)}
@@ -211,7 +214,8 @@ class DiagramSearch:
                 self.branches.left += 1
 
     def carry_on(self, progress: Progress) -> None:
-        """Start motions from those of neighbouring values and from the ends of stable parts of branches until nothing is new."""
+        """Start motions from those at neighbouring values and from the ends of stable parts of branches, until these show nothing
+        new."""
         since, ended = 0, 0
         for number in range(SETTINGS.rounds):
             known = stable_motions(self.branches.placed, self.grid, self.system.dimension)
@@ -237,14 +241,15 @@ class DiagramSearch:
         return values, np.array([state for _, state in found], dtype=float).reshape(-1, self.system.dimension)
 
     def look_for_chaos(self, progress: Progress) -> None:
-        """Find the bands of chaos, and follow what settles in windows within them."""
+        """Find the bands of chaos, and follow the orbits in the windows of periodic motion within them."""
         motions = self.found.motions
         kept = np.unique(motions.value, return_index=True)[1], self.found.rows, np.flatnonzero(motions.unsettled)
         self.band_search = BandSearch(self.work, self.bounds, self.effort.chaos)
         self._add_bands(motions.only(np.unique(np.concatenate(kept))), progress)  # each attractor once, and every value
 
     def _add_bands(self, begun: SimulatedMotions, progress: Progress = silent) -> None:
-        """Look for bands where motions are, and beside the special points of branches that are new since the last time."""
+        """Look for bands of chaos from these motions, and beside the special points of branches that are new since the last
+        time."""
         if self.band_search is not None:
             self.found.add(self.band_search.look(begun, band_origins(self.branches.branches), progress))
             self.chaos = self.band_search.bands
@@ -253,9 +258,9 @@ class DiagramSearch:
     def estimate(self, follow: bool) -> None:
         """Estimate which share of the states ends on something that the diagram does not have, by random motions.
 
-        What has not settled where there is no chaos is given more time, as it is on its way to something. With `follow` these
-        motions are followed too and, unless the effort has one sample alone, chaos is looked for where they do not settle, after
-        they have been counted; new ones are counted then.
+        Motions that have not settled outside bands of chaos are given more time, as they are still on their way to an attractor.
+        With `follow`, after the sample is counted, the orbits on which its motions settle are followed and, if the effort has
+        more than one sample, chaos is looked for where they do not settle. Then a new sample is counted.
         """
         for number in range(self.effort.samples):
             motions = self._random_motions(number)
@@ -273,7 +278,7 @@ class DiagramSearch:
                 self._add_bands(motions.only(motions.unsettled & ~self._in_bands(motions.value)))
 
     def _random_motions(self, number: int) -> SimulatedMotions:
-        """Motions from random states of the window at random values, from a seed of their own."""
+        """Motions from random states of the window at random values; each sample has its own seed."""
         rng = np.random.default_rng([self.seed, number, self.effort.sample])
         values = rng.uniform(*self.bounds, self.effort.sample)
         points = rng.uniform(-1.0, 1.0, (self.effort.sample, len(self.window)))
@@ -292,12 +297,12 @@ class DiagramSearch:
 
 
 def _middle(run: np.ndarray) -> int:
-    """The motion of a run that is followed for all of them."""
+    """The motion in the middle of a run, which is followed for all of them."""
     return int(run[len(run) // 2])
 
 
 def _filled(groups: list[np.ndarray], count: int, kept: int) -> np.ndarray:
-    """The last states (k, kept, d) of up to `count` motions of each group, filled up with nan, (groups, count, kept, d)."""
+    """The last `kept` states of up to `count` motions of each group, filled up with nan, (groups, count, kept, d)."""
     result = np.full((len(groups), count, kept, groups[0].shape[-1]), np.nan)
     for row, states in enumerate(groups):
         chosen = states[:count, -kept:]

@@ -1,8 +1,8 @@
-"""What takes long in the search of a diagram, in this process or as parts that a store remembers and that others compute.
+"""The long computations of a diagram's search, done in this process, or as parts that other processes compute and a store keeps.
 
-Each part is a pure function of its inputs, which are JSON: motions and how they end, the judgement of what has not settled, an
-orbit followed along the parameter, and how far an orbit is from itself after some of its periods. A search that runs again finds
-in its store what was computed before it was stopped.
+Each part is a pure function of its inputs, which are JSON: how motions end, the judgement of motions that have not settled, the
+branch of an orbit, and the distance of an orbit from itself after some of its periods. A search that runs again finds in its
+store what was computed before it was stopped.
 """
 
 from __future__ import annotations
@@ -46,18 +46,18 @@ NUMBERS = (
     "highest",
     "lowest",
     "slowest",
-)  # of a motion, one each, before its states
-JUDGED = ("verdict", "doubt", "exponent", "error", "gone", "life", "period")  # of a judgement
+)  # the first entries of a motion's row, before its states
+JUDGED = ("verdict", "doubt", "exponent", "error", "gone", "life", "period")  # the first entries of a judgement's row
 EARLIER = tuple(part.name for part in fields(Earlier))
-WHOLE = (*NUMBERS[1:4], "verdict", "doubt", "gone")  # which of these are whole numbers
+WHOLE = (*NUMBERS[1:4], "verdict", "doubt", "gone")  # the entries that are whole numbers
 COMPANIONS = JUDGEMENT.companions  # the most states that are kept of a judgement
-SETTLED, ALIKE = 32, 4  # the most settled motions, and such of one period, that are kept of a judgement
-BRANCH_BYTES = 1 << 20  # the most of a branch: one of 200 points has 12 000
+SETTLED, ALIKE = 32, 4  # the most settled motions that are kept of a judgement, and the most of one period
+BRANCH_BYTES = 1 << 20  # the most bytes of a branch: one of 200 points has 12 000
 
 
 @dataclass(frozen=True)
 class Request:
-    """A branch that is asked for: of what, how far, how finely, and whether only while its orbits are stable."""
+    """The request for a branch: its start, its bounds, its longest step, and whether it ends where its orbits lose stability."""
 
     start: PeriodicOrbit | SpecialPoint  # an orbit to be followed, or a special point at which branches are born
     bounds: tuple[float, float]
@@ -78,13 +78,13 @@ class Request:
 
 @dataclass
 class DiagramWork:
-    """The functions that a search calls for what takes long."""
+    """The functions that a search calls for its long computations."""
 
     system: System
     path: str
-    parts: Parts | None = None  # None: everything is computed here, and nothing remembered
-    at_once: int = 1  # branches that are followed at once, some of which may turn out not to be needed
-    # Of motions that are known to end: the forcing periods that they were given, and those after which they ended.
+    parts: Parts | None = None  # None: everything is computed in this process, and nothing is kept
+    at_once: int = 1  # branches that are computed at the same time; some of them may turn out not to be needed
+    # For motions that are known to end: how many forcing periods they were given, and after how many they ended.
     ended: dict[tuple[float, ...], tuple[int, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -100,7 +100,7 @@ class DiagramWork:
         return simulate_from(self.system, self.path, values, states, periods, progress, self.followed)
 
     def followed(self, values: np.ndarray, states: np.ndarray, periods: int, progress: Progress = silent) -> SimulatedMotions:
-        """`followed` from states at values of the parameter: no longer than so many periods, also where they are slow."""
+        """`followed` from states at values of the parameter, for at most so many periods, even if motions are slow."""
         if self.parts is None:
             return followed(self.system, self.path, values, states, periods, progress)
         begun = np.column_stack([values, states]).tolist()
@@ -111,7 +111,10 @@ class DiagramWork:
         return _motions(values, np.array(rows), self.system.dimension)
 
     def _time(self, begun: tuple[float, ...], periods: int) -> int:
-        """The time that a motion was given that is known to end within `periods`, as it does so however much it is given."""
+        """The forcing periods to ask for: `periods` or, if the motion is known to end within these, as many as it was given then.
+
+        It ends in the same way, and the store has the answer to the earlier request.
+        """
         given, end = self.ended.get(begun, (periods, 0.0))
         return given if end <= periods else periods
 
@@ -135,26 +138,26 @@ class DiagramWork:
         return _judged(np.array(self.parts.rows(self._kinds["judgements"], inputs)), settings.companions, self.system.dimension)
 
     def follow(self, requests: Sequence[Request]) -> list[list[Branch]]:
-        """The branches of each request, those that are not known `at_once`."""
+        """The branches of each request; those that the store lacks are computed at the same time."""
         if self.parts is None:
             return [request.branches(self.path) for request in requests]
         texts = self.parts.texts(self._kinds["branches"], [request.to_json() for request in requests])
         return [from_bytes(text) if text else request.branches(self.path) for request, text in zip(requests, texts, strict=True)]
 
     def prepare(self, requests: Sequence[Request]) -> None:
-        """Compute branches that may be asked for, at once, if there is somebody to do so."""
+        """Compute branches that may be asked for later at the same time, if there are other processes to do so."""
         if self.at_once > 1 and self.parts is not None:
             self.parts.rows(self._kinds["branches"], [request.to_json() for request in requests])
 
     def distances(self, starts: np.ndarray) -> np.ndarray:
-        """`closing_distances` of orbits, (n,), of rows as `closing_rows` gives them."""
+        """`closing_distances` of orbits, (n,), which are given as rows by `closing_rows`."""
         if self.parts is None or not len(starts):
             return closing_distances(self.system, self.path, starts)
         return np.array(self.parts.rows(self._kinds["distances"], starts.tolist()))[:, 0]
 
 
 def _parts(dimension: int) -> dict[str, Any]:
-    """The kinds of parts, for states of so many variables."""
+    """The kinds of parts by name, for states of so many variables."""
     from saltus.sweep import Part
 
     numbers = len(NUMBERS) + dimension + (dimension + 1) * KEPT
@@ -204,11 +207,12 @@ def diagram_work(
             kept.write((0,), finished({}, {"diagram": np.zeros(1)}))
 
 
-BRANCHES_AT_ONCE = 8  # branches: the same number whoever computes them, so that what is kept does not depend on that
+BRANCHES_AT_ONCE = 8  # branches, whatever the number of processes, so that what is computed does not depend on this number
 
 
 def diagram_plan(system: System, path: str, bounds: tuple[float, float], window: Any, seed: int) -> Plan:
-    """What the store of a diagram is of: searches that differ in anything else have parts in common, and may share one."""
+    """The plan that identifies the store of a diagram: searches that agree in its entries have parts in common, and may share a
+    store."""
     from saltus.sweep import Plan, Variable
 
     about = {"kind": "diagram", "path": path, "bounds": list(bounds), "window": np.ravel(window).tolist()}
@@ -227,14 +231,14 @@ def finished(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str
 
 
 def _given(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> tuple[System, list[Any]]:
-    """The system, and the inputs that a chunk is of."""
+    """The system, and the inputs of the parts in a chunk."""
     system = System.from_json(arguments["system"])
     check_provenance(arguments, system, "this diagram")
     return system, [arguments["inputs"][row] for row in np.asarray(block["row"], dtype=int)]
 
 
 def motions(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """How motions from [value, coordinates, velocities] end within so many forcing periods, the last number."""
+    """How motions end: each input is the value of the parameter, coordinates, velocities, and the most forcing periods."""
     system, inputs = _given(arguments, block)
     begun = np.array(inputs, dtype=float)
     d = system.dimension
@@ -248,7 +252,7 @@ def motions(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str,
 
 
 def _motions(values: np.ndarray, rows: np.ndarray, d: int) -> SimulatedMotions:
-    """Motions as they were kept."""
+    """The motions that `motions` has written as rows."""
     rows = rows.reshape(len(values), -1)
     n, columns = len(NUMBERS), dict(zip(NUMBERS, rows.T, strict=False))
     columns |= {name: columns[name].astype(int) for name in NUMBERS if name in WHOLE}
@@ -259,7 +263,7 @@ def _motions(values: np.ndarray, rows: np.ndarray, d: int) -> SimulatedMotions:
 
 
 def judgements(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """The judgements of what has not settled at values of the parameter, all by the same settings, as all are from one call."""
+    """The judgements of motions that have not settled; all inputs have the same settings, as they come from one call."""
     system, inputs = _given(arguments, block)
     d = system.dimension
     result = np.full((len(inputs), len(JUDGED) + d * COMPANIONS + (d + 1) * SETTLED), np.nan)
@@ -282,7 +286,8 @@ def judgements(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[s
 
 
 def _some(settled: SettledLater) -> SettledLater:
-    """Some of what companions of each question have settled on, of every period some: as many as are kept."""
+    """The motions that are kept of those on which companions have settled: at most `SETTLED` for each question, and of these at
+    most `ALIKE` of each period."""
     order = np.lexsort((settled.state[:, 0], settled.period, settled.question))
     question, period = settled.question[order], settled.period[order]
     alike = np.arange(len(order)) - np.searchsorted(_pairs(question, period), _pairs(question, period))
@@ -298,7 +303,7 @@ def _pairs(question: np.ndarray, period: np.ndarray) -> np.ndarray:
 
 
 def _judged(rows: np.ndarray, companions: int, d: int) -> Judged:
-    """Judgements as they were kept."""
+    """The judgements that `judgements` has written as rows."""
     n, columns = len(JUDGED), dict(zip(JUDGED, rows.T, strict=False))
     columns |= {name: columns[name].astype(int) for name in JUDGED if name in WHOLE}
     settled = rows[:, n + d * COMPANIONS :].reshape(len(rows), SETTLED, d + 1)
@@ -320,6 +325,6 @@ def branches(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str
 
 
 def distances(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """How far orbits are from themselves after some of their periods."""
+    """The distances of orbits from themselves after some of their periods."""
     system, inputs = _given(arguments, block)
     return {"result": closing_distances(system, arguments["path"], np.array(inputs, dtype=float))[:, None]}

@@ -16,28 +16,28 @@ class Effort(StrEnum):
 
     QUICK = "quick"  # a first picture
     STANDARD = "standard"  # the paper's figures
-    THOROUGH = "thorough"  # motions that attract one state in a thousand
+    THOROUGH = "thorough"  # also motions with basins of a thousandth of the window
 
 
 @dataclass(frozen=True)
 class EffortSettings:
     """What is simulated and followed for a diagram."""
 
-    values: int  # Values of the parameter, evenly from bound to bound: the least width of what is surely met.
-    starts: int  # Initial states at each of them: what attracts less than 1 of these many states may be missed there.
+    values: int  # Values of the parameter, evenly from bound to bound: what exists between two of them only may be missed.
+    starts: int  # Initial states at each value: a basin of a smaller share of the window than 1 / starts may be missed there.
     periods: int  # Forcing periods that a motion is given to settle; slow ones have 8 times as many.
-    repelling_values: int  # Values at which repelling orbits are searched for: they are followed from one to the others.
-    # With this number of branches, no more are followed that are born on others; and so many at most of orbits that repel.
+    repelling_values: int  # Values at which repelling orbits are searched for; elsewhere their branches are followed.
+    # Once there are this many branches, those born on others are not followed any more; so many repelling orbits are followed.
     branches: int
-    narrow: int  # Branches at most of motions that are stable in a small part of the range alone, as in windows of chaos.
+    narrow: int  # The most branches of orbits that are stable in a small part of the range only, as in windows of chaos.
     jumps: int  # Rounds in which motions are started beyond the ends of stable parts of branches, to see where they fall to.
-    sample: int  # Motions of the sample that tells what share of the states ends on something that the diagram has not.
-    # Samples at most: what one shows to be missing is followed, and the next one begins anew, until one shows nothing missing.
+    sample: int  # Random motions of the sample by which the share of states is estimated that end on what the diagram lacks.
+    # The most samples: what one shows to be missing is followed, then a new one is drawn, until one shows nothing missing.
     samples: int
-    # Forcing periods that random motions are given which have not settled where there is no chaos: transients of three times the
-    # mean life that is excluded for chaos, 6600 or, with one judgement, 660, leave one in twenty.
+    # Further forcing periods for random motions that have not settled outside chaos: three times the mean life that is excluded
+    # for chaos (6600, with one judgement 660), so that of transients with this life one in twenty is left.
     lasting: int = 20_000
-    chaos: ChaosSettings = CHAOS  # How finely bands of chaos are resolved, and how surely they are none of transients.
+    chaos: ChaosSettings = CHAOS  # How finely bands of chaos are resolved, and how surely transients are excluded.
 
 
 EFFORTS = {
@@ -52,8 +52,8 @@ EFFORTS = {
         sample=300,
         samples=1,
         lasting=2000,
-        # Exponents of less than about 0.004 per unit of time are left undecided, as those of motions about tori are, and so are
-        # multipliers above about 0.97: such motions would take most of the time.
+        # Motions with exponents below about 0.004 per unit of time, such as those on tori, are left undecided, and so are orbits
+        # with multipliers above about 0.97: they would take most of the time.
         chaos=replace(
             CHAOS,
             step=4e-3,

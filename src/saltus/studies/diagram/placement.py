@@ -1,4 +1,4 @@
-"""Which simulated motions lie on stable branches: read off between the points of a branch, solved for where that leaves doubt."""
+"""Which simulated motions lie on stable branches: by interpolation between a branch's points, or by solving for the orbit."""
 
 from __future__ import annotations
 
@@ -16,16 +16,17 @@ from saltus.studies.diagram.simulated import SimulatedMotions
 class PlacementSettings:
     """When a simulated motion is the orbit of a branch."""
 
-    same: float = 1e-5  # Extrema of a settled motion and of an orbit agree to this, relative to the amplitude or to 1e-3.
+    # The extrema of a settled motion and of its orbit agree to this share of the amplitude, or of `least` if that is larger.
+    same: float = 1e-5
     least: float = 1e-3
-    # Extrema between two points of a branch follow from a cubic and from a quadratic through the points about them. Where these
-    # differ by more than this share of the amplitude, the orbit is solved for.
+    # Extrema between two points of a branch are interpolated by a cubic and by a quadratic through the points about them. If the
+    # two differ by more than this share of the amplitude, the orbit is solved for.
     certain: float = 1e-3
-    # A motion is tried on a branch whose extrema between its points are this near, as a share of the amplitude, beside the change
-    # from one of these points to the other.
+    # The orbit is solved for if a motion's extrema differ from the interpolated ones by less than this share of the amplitude and
+    # twice the change of the extrema between the two points.
     near: float = 0.05
-    # Least speeds of impacts below this are not compared. Of impacts that die away motions have all that were followed, orbits
-    # those that are listed, above 1e-5, and the last of these is faster the faster they die away.
+    # Least speeds of impacts below this are taken as this. In an accumulation, a motion has as many impacts as were followed, and
+    # an orbit lists those above 1e-5, so that their slowest impacts differ.
     slow: float = 2e-4
 
 
@@ -54,8 +55,10 @@ class PlacedBranch:
         return np.array([self.branch.is_joined(i) for i in range(len(self.branch.points) - 1)], dtype=bool)
 
     def crossings(self, values: np.ndarray, stable: bool = True) -> tuple[np.ndarray, np.ndarray]:
-        """Where the branch passes each of the values, with a stable point on a side of it: numbers of values, and of the points
-        before; with `stable` False also where both sides repel."""
+        """Where the branch passes the values: the indices of the values, and those of the branch's points before them.
+
+        With `stable`, one of the points on both sides of a value must be stable.
+        """
         parameter, counts = self.columns[0], (self.columns[3] > 0) | (not stable)
         if len(parameter) < 2:
             return np.empty(0, dtype=int), np.empty(0, dtype=int)
@@ -70,8 +73,8 @@ class PlacedBranch:
         return rows[each], before[each]
 
     def extrema(self, values: np.ndarray, before: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Extrema and slowest impact at values (k,) after the points of these numbers, (k, 3), how uncertain they are as they are
-        read off, and how much they change to the next point, (k,) each.
+        """Extrema and slowest impact at values (k,) after the points of these indices, interpolated, (k, 3); their uncertainty,
+        (k,); and how much they change from one point to the next, (k,).
 
         The uncertainty is inf where the parameter turns, or where too few points are joined.
         """
@@ -89,7 +92,7 @@ class PlacedBranch:
 
     @cached_property
     def _smooth(self) -> np.ndarray:
-        """Whether a point and the next one have a neighbour each, the four are joined, and the parameter does not turn, (n,)."""
+        """Whether a point, the next one and the neighbours of both are joined and the parameter does not turn there, (n,)."""
         smooth, steps = np.zeros(len(self.columns[0]), dtype=bool), np.diff(self.columns[0])
         if len(steps) >= 3:
             three = np.lib.stride_tricks.sliding_window_view(np.where(self.joined, np.sign(steps), 0.0), 3)
@@ -97,7 +100,7 @@ class PlacedBranch:
         return smooth
 
     def holds(self, orbit: PeriodicOrbit, value: float) -> bool:
-        """Whether an orbit at a value, stable or not, or its mirror image, lies on the branch."""
+        """Whether an orbit at a value of the parameter, stable or not, or its mirror image, lies on the branch."""
         seen = _seen(orbit)
         for before in self.crossings(np.array([value]), stable=False)[1].tolist():
             expected, _, change = self.extrema(np.array([value]), np.array([before]))
@@ -109,7 +112,7 @@ class PlacedBranch:
         return False
 
     def solved(self, value: float, before: int) -> PeriodicOrbit | None:
-        """The orbit at a value after the point of this number, solved there."""
+        """The orbit at a value of the parameter after the point of this index, solved for; None if that fails."""
         for place in (before, before + 1):
             if self.columns[0, place] == value:
                 return self.branch.points[place].orbit
@@ -118,7 +121,7 @@ class PlacedBranch:
 
 
 def _lagrange(nodes: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """The polynomials through values (n, k, m) at nodes (k, m), at one place each, (n, k)."""
+    """Lagrange's polynomials of degree m - 1 through values (n, k, m) at nodes (k, m), each at its place `at` (k,), (n, k)."""
     result = np.zeros(values.shape[:2])
     for i in range(nodes.shape[1]):
         others = np.delete(nodes, i, axis=1)
@@ -127,19 +130,19 @@ def _lagrange(nodes: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarr
 
 
 def _slowest(orbit: PeriodicOrbit) -> float:
-    """The least speed of an impact of an orbit with several contacts, or that of what dies away; else 0, as motions have it."""
+    """The least speed of an impact of an orbit, at least `SETTINGS.slow`; 0 for models with one contact, as motions have it."""
     if not orbit.system.model.contacts:
         return 0.0
     return max(orbit.slowest if np.isfinite(orbit.slowest) else 0.0, SETTINGS.slow)
 
 
 def _seen(orbit: PeriodicOrbit) -> np.ndarray:
-    """What motions and orbits are compared by: the extrema and the slowest impact."""
+    """The quantities by which motions and orbits are compared: the extrema and the slowest impact."""
     return np.array([orbit.highest, orbit.lowest, _slowest(orbit)])
 
 
 def stable_motions(branches: list[PlacedBranch], grid: np.ndarray, dimension: int) -> np.ndarray:
-    """The stable orbits of branches at the values of a grid, roughly, as records of a chart; their states are nan."""
+    """The stable orbits of branches at the values of a grid, by interpolation, as records of a chart; their states are nan."""
     record = motion_type(dimension)
     parts = [np.zeros(0, record)]
     for branch in branches:
@@ -160,11 +163,11 @@ def placed(motions: SimulatedMotions, branches: list[PlacedBranch], mirrored: bo
     Parameters
     ----------
     motions
-        What is looked for.
+        The motions that are looked for.
     branches
-        Where.
+        The branches on which they are looked for.
     mirrored
-        Whether mirror images count as one.
+        Whether a motion also lies on a branch if its mirror image does.
     """
     result = np.zeros(len(motions), dtype=bool)
     least = SETTINGS.slow if branches and branches[0].branch.orbits[0].system.model.contacts else 0.0
@@ -187,7 +190,7 @@ def placed(motions: SimulatedMotions, branches: list[PlacedBranch], mirrored: bo
 
 
 def _apart(seen: np.ndarray, expected: np.ndarray, mirrored: bool) -> np.ndarray:
-    """How far motions are apart, (highest, lowest, slowest impact) each."""
+    """The largest difference of (highest, lowest, slowest impact); with `mirrored` also to the mirror image, the smaller one."""
     apart = np.abs(seen - expected).max(axis=-1)
     image = np.stack([-expected[..., 1], -expected[..., 0], expected[..., 2]], axis=-1)
     return np.asarray(np.minimum(apart, np.abs(seen - image).max(axis=-1)) if mirrored else apart)

@@ -8,7 +8,7 @@ import numpy as np
 
 from saltus.attractors import Judged, Unsettled
 
-RANKS = (Unsettled.PERIODIC, Unsettled.TRANSIENT, Unsettled.UNDECIDED, Unsettled.CHAOTIC)  # of several, the last one counts
+RANKS = (Unsettled.PERIODIC, Unsettled.TRANSIENT, Unsettled.UNDECIDED, Unsettled.CHAOTIC)  # of several verdicts, the last counts
 
 
 @dataclass(order=True)
@@ -16,14 +16,15 @@ class SearchedValue:
     """What is known at one value of the parameter."""
 
     value: float
-    verdict: Unsettled = field(default=Unsettled.PERIODIC, compare=False)  # all motions settle, where nothing else is known
+    verdict: Unsettled = field(default=Unsettled.PERIODIC, compare=False)  # until a motion is judged, all are taken to settle
     exponent: float = field(default=np.nan, compare=False)
     error: float = field(default=np.nan, compare=False)
     life: float = field(default=np.nan, compare=False)
-    period: int = field(default=0, compare=False)  # of what settles slowly, or on a long period
-    care: int = field(default=0, compare=False)  # number of the judgement that the verdict is of
-    settled: int = field(default=0, compare=False)  # companions that settled in it
-    chaos: np.ndarray = field(default_factory=lambda: np.empty((0, 0)), compare=False)  # (n, d): states of what is unsettled
+    period: int = field(default=0, compare=False)  # of a motion that settles slowly, or on an orbit of a long period
+    care: int = field(default=0, compare=False)  # number of the judgement that gave the verdict
+    settled: int = field(default=0, compare=False)  # companions that settled in that judgement
+    chaos: np.ndarray = field(default_factory=lambda: np.empty((0, 0)), compare=False)  # (n, d): states of unsettled motions
+    # Period, number of impacts, amplitude and state at phase 0 of each motion that has settled.
     orbits: list[tuple[int, int, float, np.ndarray]] = field(default_factory=list, compare=False)
 
     @property
@@ -33,7 +34,7 @@ class SearchedValue:
 
     @property
     def quiet(self) -> float:
-        """Forcing periods in which none of the companions has settled, if none has at all; see `Judged.life`."""
+        """Forcing periods of companions, in all, if none of these has settled, else 0; see `Judged.life`."""
         return 0.0 if self.settled else 3.0 * self.life
 
     @property
@@ -43,18 +44,19 @@ class SearchedValue:
 
     @property
     def goes_on(self) -> bool:
-        """Whether motions are chaotic, may be so, or repeat themselves after more forcing periods than all that have settled."""
+        """Whether motions here are chaotic or may be so, or have a longer period than all motions that have settled."""
         long = self.period > max((orbit[0] for orbit in self.orbits), default=0)
         open_ = self.verdict in (Unsettled.CHAOTIC, Unsettled.UNDECIDED)
         return open_ or (self.verdict is Unsettled.PERIODIC and long)
 
     @property
     def longest(self) -> int:
-        """The longest period of what settles, in forcing periods."""
+        """The longest period of the motions that settle, in forcing periods."""
         return max(self.period, *(orbit[0] for orbit in self.orbits), 0)
 
     def judge(self, judged: Judged, row: int, care: int) -> None:
-        """Take an answer about what is unsettled here; a more careful one replaces what was thought before."""
+        """Take the verdict on the unsettled motions here, unless an earlier judgement was more careful, or as careful and found a
+        verdict of higher rank."""
         verdict = Unsettled(judged.verdict[row])
         if care < self.care or (care == self.care and RANKS.index(verdict) < RANKS.index(self.verdict)):
             return

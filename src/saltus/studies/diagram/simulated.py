@@ -1,4 +1,4 @@
-"""The motions of a diagram's one simulation: where each of them begins, along the parameter, and how it ends."""
+"""The simulated motions of a diagram: at which value of the parameter and in which state each begins, and how it ends."""
 
 from __future__ import annotations
 
@@ -20,20 +20,21 @@ from saltus.window import Window
 class SimulationSettings:
     """How motions are started, followed and kept."""
 
-    # The compiled lanes tell periods up to this one (`RECURRENCE`): those beyond a diagram's longest one are no chaos either.
+    # The longest period that the compiled lanes recognise (`RECURRENCE`), even if a diagram follows shorter ones only: motions of
+    # periods between must not be taken as unsettled.
     max_period: int = 16
-    kept: int = 64  # Stroboscopic states that are kept of each motion, for the dots of a diagram and as beginnings of others.
+    kept: int = 64  # Stroboscopic states that are kept of each motion, as dots of a diagram and as starts of other motions.
     # Every other start lies in a smaller copy of the window, down to this share of its size: some motions are small.
     innermost: float = 1e-2
-    # An unsettled motion is slow and no chaos if it comes back so near to where it was, relative to the size of the motion.
+    # An unsettled motion is taken as slow, not chaotic, if it returns to an earlier state within this share of its amplitude.
     slow: float = 1e-2
-    patience: int = 8  # Slow motions are followed for so many times the forcing periods of the others.
-    # With several contacts or frictions chaos comes back so near, too, and its impacts take long to follow: there this is done in
-    # rounds as long as the first one, as long as each of them brings a motion nearer to itself by this factor. What does not can
+    patience: int = 8  # Slow motions are followed for this many times the forcing periods of the others.
+    # With several contacts or frictions chaotic motions return as near, too, and their impacts take long to follow. There a slow
+    # motion is followed in rounds, as long as each round reduces the distance of its return by this factor; otherwise it can
     # hardly settle in the time that is left.
     nearer: float = 0.3
     still: float = 1e-6  # A motion that stays this near to the contact is at rest.
-    tol: float = 1e-11  # The error of a step: a tenth of what the lanes ask of states that are the same.
+    tol: float = 1e-11  # The error of a step: a tenth of the distance within which the lanes take states as the same.
 
 
 SETTINGS = SimulationSettings()
@@ -44,13 +45,13 @@ class SimulatedMotions:
     """Motions along one parameter, a row for each."""
 
     value: np.ndarray  # (n,) of the parameter
-    periods: np.ndarray  # (n,): forcing periods that it was followed, when last it was
+    periods: np.ndarray  # (n,): forcing periods for which it was followed the last time
     last: np.ndarray  # (n, d): coordinates and velocities at the end, at phase 0
     outcome: np.ndarray  # (n,): an `Outcome`
     period: np.ndarray  # (n,): forcing periods after which it repeats itself; 0 where it does not
-    impact_count: np.ndarray  # (n,): impacts in one period; in those that are kept where it has none
-    highest: np.ndarray  # (n,): largest coordinate over its period, or those that are kept
-    lowest: np.ndarray  # (n,): the least one
+    impact_count: np.ndarray  # (n,): impacts in one period or, if it has none, in the forcing periods that are kept
+    highest: np.ndarray  # (n,): largest coordinate over its period, or over the forcing periods that are kept
+    lowest: np.ndarray  # (n,): least coordinate over the same time
     slowest: np.ndarray  # (n,): with several contacts the least speed of an impact; else 0
     states: np.ndarray  # (n, kept, d): its last stroboscopic states, of a periodic motion those of one period; else nan
     peaks: np.ndarray  # (n, kept): max abs of the coordinate in each of these periods
@@ -65,7 +66,7 @@ class SimulatedMotions:
 
     @property
     def periodic(self) -> np.ndarray:
-        """Which repeat themselves, beside those at rest, (n,)."""
+        """Which repeat themselves and are not at rest, (n,)."""
         return np.asarray(self.period > 0)
 
     @property
@@ -88,7 +89,7 @@ class SimulatedMotions:
         return SimulatedMotions(*(getattr(self, part.name)[rows] for part in fields(self)))
 
     def gone_on(self, rows: np.ndarray, later: SimulatedMotions) -> None:
-        """Put what has become of some of the motions in their places."""
+        """Replace the motions of these rows by what has become of them later."""
         for part in fields(self):
             getattr(self, part.name)[rows] = getattr(later, part.name)
 
@@ -104,8 +105,8 @@ Follow = Callable[[np.ndarray, np.ndarray, int, Progress], SimulatedMotions]
 def starts_at(system: System, values: np.ndarray, count: int, window: Window, seed: int) -> np.ndarray:
     """(values, count, d): states spread over the window at each value, every other one drawn in towards the contact.
 
-    Those of a value follow from the seed and the value alone, and more of them begin with the fewer: a finer grid or more starts
-    only adds to what was simulated. Their union over the values is dense in the window.
+    The states at a value follow from the seed and the value alone, and the first of more states are those of fewer: a finer grid
+    or more starts only add motions to those that were simulated. The states at all values together are dense in the window.
     """
     bits = np.ascontiguousarray(values, dtype="<f8").view("<u4").reshape(len(values), 2)
     size, steps = len(window) + 1, even_steps(len(window))
@@ -128,7 +129,7 @@ def simulate_from(
 ) -> SimulatedMotions:
     """Follow motions from states (n, d) at phase 0 at values (n,) of the parameter until they settle or the time is up.
 
-    `follow` is what `followed` of the system along the path gives, where it is computed elsewhere.
+    `follow` takes the place of `followed` where another process computes or a store remembers.
     """
     follow = follow or partial(followed, system, path)
     found = follow(values, states, periods, progress)
@@ -146,7 +147,7 @@ def simulate_from(
 def followed(
     system: System, path: str, values: np.ndarray, states: np.ndarray, periods: int, progress: Progress = silent
 ) -> SimulatedMotions:
-    """Follow motions from states (n, d) at values (n,) for so many forcing periods at most, each whatever the others are."""
+    """Follow motions from states (n, d) at values (n,) for at most so many forcing periods; none depends on the others."""
     ends = find_recurrence(
         system,
         states,
@@ -164,7 +165,7 @@ def followed(
 
 
 def _motions(system: System, values: np.ndarray, ends: Recurrence) -> SimulatedMotions:
-    """The motions as they have ended; those that stay at the contact are at rest."""
+    """The motions with their ends; a motion that stays at the contact is at rest."""
     assert ends.extrema is not None
     highest, lowest = ends.highest, ends.lowest
     period, outcome = ends.period.copy(), ends.outcome.copy()
@@ -187,10 +188,10 @@ def _motions(system: System, values: np.ndarray, ends: Recurrence) -> SimulatedM
 
 
 def _return_distance(motions: SimulatedMotions) -> np.ndarray:
-    """How near motions come back to where they were, (n,); inf where that is not known."""
+    """The least distance at which motions return to an earlier state, (n,); inf where that is not known."""
     return np.asarray(np.nan_to_num(return_distances(motions.states, SETTINGS.max_period).min(axis=1), nan=np.inf))
 
 
 def _is_slow(motions: SimulatedMotions) -> np.ndarray:
-    """Which motions come back near to where they were, (n,)."""
+    """Which motions return near to an earlier state, (n,)."""
     return np.asarray(_return_distance(motions) <= SETTINGS.slow * np.maximum(motions.amplitude, SETTINGS.still))
