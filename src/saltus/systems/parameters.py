@@ -20,7 +20,8 @@ def children(node: Any) -> dict[str, Any]:
         return {"frequency": node.frequency, **node.channels}
     if isinstance(node, (Sum, Factors)):
         return {str(i): term for i, term in enumerate(node.terms if isinstance(node, Sum) else node)}
-    return {name: getattr(node, name) for name in _fields_of(type(node))}
+    kind: Any = type(node)
+    return {name: getattr(node, name) for name in _fields_of(kind)}
 
 
 @cache
