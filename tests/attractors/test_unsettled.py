@@ -7,7 +7,7 @@ import pytest
 from shared_systems import forced
 
 from saltus import WallOscillator, simulate_many
-from saltus.attractors import JUDGEMENT, Doubt, Earlier, JudgementSettings, Unsettled, judge_unsettled
+from saltus.attractors import JUDGEMENT, Doubt, Earlier, JudgementSettings, SettledLater, Unsettled, judge_unsettled
 from saltus.attractors.verdict import unsettled
 from saltus.flow import Outcome, Recurrence, find_recurrence
 from saltus.systems import Harmonic, Load, System
@@ -118,6 +118,18 @@ def test_an_earlier_judgement_that_was_wrong_is_corrected():
     wrong = Earlier(np.array([0.1]), np.array([0.01]), np.array([2000.0]))
     states = unsettled_states(system, AMPLITUDE, 7.2, starts=24)
     assert judge_unsettled(system, states, {AMPLITUDE: np.array([7.2])}, earlier=wrong).verdict.tolist() == [Unsettled.TRANSIENT]
+
+
+def test_of_what_companions_settle_on_a_few_of_each_period_and_question_are_kept():
+    rng, k = np.random.default_rng(4), 60
+    settled = SettledLater(rng.integers(0, 4, k), rng.normal(size=(k, 2)), rng.integers(1, 5, k))
+    few = settled.few(2, 5)
+    for question in range(4):
+        periods, given = few.period[few.question == question], settled.period[settled.question == question]
+        assert len(periods) == min(5, sum(min(2, np.count_nonzero(given == period)) for period in range(1, 5)))
+        assert np.bincount(periods).max() <= 2
+    rows = {tuple(row) for row in np.column_stack([settled.question, settled.period, settled.state])}
+    assert {tuple(row) for row in np.column_stack([few.question, few.period, few.state])} <= rows
 
 
 @pytest.fixture

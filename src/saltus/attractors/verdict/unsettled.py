@@ -122,6 +122,13 @@ class SettledLater:
         """These and others."""
         return SettledLater(*(np.concatenate([getattr(self, n), getattr(other, n)]) for n in ("question", "state", "period")))
 
+    def few(self, alike: int, most: int) -> SettledLater:
+        """At most `most` of the motions of each question, and of these at most `alike` of each period."""
+        order = np.lexsort((self.state[:, 0], self.period, self.question))
+        for key, count in (self.question * (1 + self.period.max(initial=0)) + self.period, alike), (self.question, most):
+            order = order[np.arange(len(order)) - np.searchsorted(key[order], key[order]) < count]
+        return SettledLater(self.question[order], self.state[order], self.period[order])
+
 
 def judge_unsettled(
     system: System,

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from saltus.attractors import Earlier, SettledLater, Unsettled
+from saltus.attractors import Earlier, Unsettled
 from saltus.checks import check_count
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import checked_by
@@ -202,7 +202,7 @@ class BandSearch:
         judged = self.work.judge(values, states, self.settings.judgements[care], earlier)
         for row, value in enumerate(values):
             self.place(float(value)).judge(judged, row, care)
-        found = _some(judged.settled, self.settings.neighbours)
+        found = judged.settled.few(self.settings.neighbours // 2, len(judged.settled.period))
         if len(found.question):
             column = values[found.question]
             self._settle(self.work.simulate(column, found.state, self.settings.settling))
@@ -391,16 +391,3 @@ class BandSearch:
             period=np.array([place.longest for place in self.places]),
             states=states,
         )
-
-
-def _some(settled: SettledLater, most: int) -> SettledLater:
-    """At most half of `most` motions of each period, for each question."""
-    order = np.lexsort((settled.state[:, 0], settled.period, settled.question))
-    kept: list[int] = []
-    counts: dict[tuple[int, int], int] = {}
-    for i in order:
-        key = int(settled.question[i]), int(settled.period[i])
-        counts[key] = counts.get(key, 0) + 1
-        if counts[key] <= most // 2:
-            kept.append(int(i))
-    return SettledLater(settled.question[kept], settled.state[kept], settled.period[kept])

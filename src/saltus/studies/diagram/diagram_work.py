@@ -128,7 +128,7 @@ class DiagramWork:
         """`judge_unsettled` of states (n, m, d) at values (n,) of the parameter."""
         if self.parts is None:
             found = judge_unsettled(self.system, states, {self.path: values}, settings=settings, earlier=earlier)
-            return replace(found, settled=_some(found.settled))
+            return replace(found, settled=found.settled.few(ALIKE, SETTLED))
         numbers = asdict(settings)
         given = [of_one[np.isfinite(of_one).all(axis=-1)].tolist() for of_one in states]
         inputs = [{"value": v, "states": s, "settings": numbers} for v, s in zip(values.tolist(), given, strict=True)]
@@ -275,7 +275,7 @@ def judgements(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[s
     earlier = Earlier(*np.array([given["earlier"] for given in inputs]).T) if "earlier" in inputs[0] else None
     values = np.array([given["value"] for given in inputs])
     found = judge_unsettled(system, states, {arguments["path"]: values}, settings=settings, earlier=earlier)
-    n, later = len(JUDGED), _some(found.settled)
+    n, later = len(JUDGED), found.settled.few(ALIKE, SETTLED)
     result[:, :n] = np.stack([getattr(found, name) for name in JUDGED], axis=1)
     result[:, n : n + d * settings.companions] = found.states.reshape(len(inputs), -1)
     for row in range(len(inputs)):
@@ -283,23 +283,6 @@ def judgements(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[s
         settled = np.column_stack([later.period[own], later.state[own]])
         result[row, n + d * COMPANIONS :][: settled.size] = settled.ravel()
     return {"result": result}
-
-
-def _some(settled: SettledLater) -> SettledLater:
-    """The motions that are kept of those on which companions have settled: at most `SETTLED` for each question, and of these at
-    most `ALIKE` of each period."""
-    order = np.lexsort((settled.state[:, 0], settled.period, settled.question))
-    question, period = settled.question[order], settled.period[order]
-    alike = np.arange(len(order)) - np.searchsorted(_pairs(question, period), _pairs(question, period))
-    order = order[alike < ALIKE]
-    question = settled.question[order]
-    order = order[np.arange(len(order)) - np.searchsorted(question, question) < SETTLED]
-    return SettledLater(settled.question[order], settled.state[order], settled.period[order])
-
-
-def _pairs(question: np.ndarray, period: np.ndarray) -> np.ndarray:
-    """Two whole numbers as one, in the same order."""
-    return np.asarray(question * (1 + period.max(initial=0)) + period)
 
 
 def _judged(rows: np.ndarray, companions: int, d: int) -> Judged:
