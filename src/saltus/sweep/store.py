@@ -20,6 +20,7 @@ from saltus.public_functions import answered
 from saltus.sweep import store_files as files
 from saltus.sweep.chunk_grid import Index
 from saltus.sweep.chunk_results import Arrays, Failure
+from saltus.sweep.interrupt import deferred_interrupts
 from saltus.sweep.jsonable import differences
 from saltus.sweep.plan import Plan
 from saltus.sweep.store_status import damage, read_plan, status
@@ -292,17 +293,22 @@ def _dataset(store: Any) -> xarray.Dataset:
 
 
 def _create(plan: Plan, path: Path) -> None:
-    """Make the store of `plan`, without any chunk, at `path`, in one step."""
-    try:
-        part = files.begin(path)
+    """Make the store of `plan`, without any chunk, at `path`, in one step.
+
+    Ctrl-C waits until it is made: Zarr writes in a thread of its own, which would go on writing into a folder that is removed.
+    """
+    with deferred_interrupts() as raise_if_interrupted:
         try:
-            _make(plan, part)
-        except BaseException:
-            shutil.rmtree(part, ignore_errors=True)
-            raise
-        files.finish(part, path)
-    except OSError as error:
-        raise SweepError(f"the store {path} cannot be made ({reason(error)}); name another") from error
+            part = files.begin(path)
+            try:
+                _make(plan, part)
+            except BaseException:
+                shutil.rmtree(part, ignore_errors=True)
+                raise
+            files.finish(part, path)
+        except OSError as error:
+            raise SweepError(f"the store {path} cannot be made ({reason(error)}); name another") from error
+    raise_if_interrupted()
 
 
 def _make(plan: Plan, folder: Path) -> None:
