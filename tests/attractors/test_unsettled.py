@@ -120,7 +120,7 @@ def test_an_earlier_judgement_that_was_wrong_is_corrected():
     assert judge_unsettled(system, states, {AMPLITUDE: np.array([7.2])}, earlier=wrong).verdict.tolist() == [Unsettled.TRANSIENT]
 
 
-def test_of_what_companions_settle_on_a_few_of_each_period_and_question_are_kept():
+def test_few_keeps_so_many_motions_of_each_period_and_of_each_question():
     rng, k = np.random.default_rng(4), 60
     settled = SettledLater(rng.integers(0, 4, k), rng.normal(size=(k, 2)), rng.integers(1, 5, k))
     few = settled.few(2, 5)
