@@ -50,6 +50,19 @@ def excluded(p, n):
 
 
 @jit
+def keeps_sign(p, n):
+    """Whether certainly p != 0 on [0, 1], as `excluded` for either sign."""
+    sign, rest = (1.0 if p[0] > 0.0 else -1.0), 0.0
+    for k in range(3, n + 1):
+        rest += abs(p[k])
+    first, second, third = sign * p[0], sign * p[1], sign * p[2]
+    low = min(first, first + second + third)
+    if third > 0.0 and 0.0 < -second < 2.0 * third:
+        low = first - second * second / (4.0 * third)
+    return low > rest
+
+
+@jit
 def to_bernstein(p, n, b):
     """Bernstein coefficients on [0, 1]: b_i = sum_k C(i,k)/C(n,k) p_k, by repeated sums as in Pascal's triangle."""
     binomial = 1.0
@@ -216,6 +229,8 @@ def leading(coefficients, start, order):
 def roots_within(p, n, roots, noise):
     """Fill `roots` with the places in (0, 1) at which a polynomial of degree n changes its sign by more than `noise`; returns
     their number."""
+    if keeps_sign(p, n):
+        return 0
     boxes = np.empty((DEPTH, n + 1))
     left, width = np.empty(DEPTH), np.empty(DEPTH)
     to_bernstein(p, n, boxes[0])

@@ -18,7 +18,7 @@ from saltus.flow.contact_side import side_of_state
 from saltus.flow.function_types import IMPACT_EQUATIONS, SEGMENTS
 from saltus.flow.kernel_layout import ROUGHER, Geometry, ModelPart, Setting, Where, Work
 from saltus.flow.memory_layout import EventCode, State
-from saltus.flow.roots import NOISE, SIMPLE, contact_root, horner, roots_within, scale_gap
+from saltus.flow.roots import NOISE, SIMPLE, contact_root, excluded, horner, roots_within, scale_gap
 from saltus.flow.steps import column_step, expand, leaps, move, step_size, work_arrays
 from saltus.taylor import by_reference, cached_jit, jit, lean_jit
 
@@ -72,9 +72,13 @@ def extremes_in_step(where, model, work, side, t, h, order, roots, seen):
     for a in range(1, where[Where.OWN]):
         extremes_of_other(q[a], v[a], h, order, roots, poly, seen)
     for j in range(where[Where.MARGINS]):
+        scale_gap(m[j], 0, order, h, poly)
+        poly[0] -= seen[LEAST_MARGIN + j]
+        if excluded(poly, order):
+            continue  # it stays above its least value so far
         least, size = min(m[j, 0], horner(m[j], order, h)), abs(m[j, 0])
         for k in range(1, order + 1):
-            poly[k - 1] = k * m[j, k] * h**k
+            poly[k - 1] = k * poly[k]
             size += abs(poly[k - 1])
         for i in range(roots_within(poly, order - 1, roots, NOISE * size)):
             least = min(least, horner(m[j], order, roots[i] * h))
