@@ -188,9 +188,13 @@ class Continuation:
     def _crossings(self, a: Any, b: Any, i: int) -> list[tuple[int, float, Any]]:
         """The places at which a step leaves the bounds of a parameter, even if it comes back: the parameter's index, the bound,
         and the point if it is found."""
-        index, found = i - len(self.bounds), []
+        found: list[tuple[int, float, Any]] = []
+        index, (low, high) = i - len(self.bounds), list(self.bounds.values())[i]
+        room = min(a.place[index] - low, b.place[index] - low, high - a.place[index], high - b.place[index])
+        if room * a.curve.weights[index] > a.curve.norm(b.place - a.place):
+            return found  # not even a step that turns round reaches a bound
         turn = turning_point(a, b, index)
-        for bound, beyond in zip(list(self.bounds.values())[i], (np.less, np.greater), strict=True):
+        for bound, beyond in zip((low, high), (np.less, np.greater), strict=True):
             if beyond(b.place[index], bound) or (turn is not None and beyond(turn.place[index], bound)):
                 found.append((i, bound, next(iter(solved_between(a, b, index, bound)), None)))
         return found

@@ -50,7 +50,12 @@ class Corrected(Generic[E]):
 
 
 def newton(
-    evaluate: Callable[[np.ndarray, bool], E | None], linear: Linear[E], guess: np.ndarray, iterations: int, rounded: float = 0.0
+    evaluate: Callable[[np.ndarray, bool], E | None],
+    linear: Linear[E],
+    guess: np.ndarray,
+    iterations: int,
+    rounded: float = 0.0,
+    near: bool = False,
 ) -> Corrected[E] | None:
     """The zero of a system near a guess, or None where Newton's method does not converge.
 
@@ -68,10 +73,12 @@ def newton(
     rounded
         The largest residual that rounding may leave if derivatives are large. It is accepted if a further step would move the
         unknowns by no more than `converged`.
+    near
+        Whether the guess itself is probably a solution: it is then evaluated thoroughly at once.
     """
     place, before = guess.copy(), np.inf
     for iteration in range(iterations + 1):
-        thorough = before <= NEWTON.last
+        thorough = before <= NEWTON.last or (near and iteration == 0)
         found = evaluate(place, thorough)
         if found is None:
             return None

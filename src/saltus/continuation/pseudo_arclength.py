@@ -32,10 +32,11 @@ class EquationCurve(Curve[P]):
         """A solution as a point."""
 
     def solve(self, guess: np.ndarray, direction: np.ndarray) -> P | None:
-        return self.solve_within(guess, direction, math.inf)
+        return self.solve_within(guess, direction, math.inf, near=True)  # most guesses lie between points that are known
 
-    def solve_within(self, guess: np.ndarray, direction: np.ndarray, reach: float) -> P | None:
-        """`solve`, but None if Newton's method leads farther than `reach` from the guess or, for a finite `reach`, in circles."""
+    def solve_within(self, guess: np.ndarray, direction: np.ndarray, reach: float, near: bool = False) -> P | None:
+        """`solve`, but None if Newton's method leads farther than `reach` from the guess or, for a finite `reach`, in circles.
+        `near` is that of `newton`."""
         normal, errors = direction * self.weights**2, list[float]()
 
         def evaluate(place: np.ndarray, thorough: bool) -> Evaluation | None:
@@ -49,7 +50,7 @@ class EquationCurve(Curve[P]):
         def linear(found: Evaluation, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             return bordered(found.derivatives(), normal), -bordered(found.residual, normal @ (place - guess))
 
-        found = newton(evaluate, linear, guess, self.iterations, self.rounded)
+        found = newton(evaluate, linear, guess, self.iterations, self.rounded, near)
         return None if found is None else self.with_tangent(found, direction)
 
     def solve_at(self, guess: np.ndarray, direction: np.ndarray, index: int = -1) -> P | None:
@@ -98,8 +99,7 @@ class EquationCurve(Curve[P]):
     def advance(self, before: P | None, point: P, step: float) -> P | None:
         """The point a step further; None if Newton's method does not converge, or converges too far from the predicted place."""
         guess = predicted(before, point, step)
-        within = self.stray * step
-        ahead = self.solve(guess, point.tangent) if within == math.inf else self.solve_within(guess, point.tangent, within)
+        ahead = self.solve_within(guess, point.tangent, self.stray * step)
         straight = before is None or not before.curve.joins(point.curve)
         off = STEPS.off_tangent if straight else STEPS.off
         return None if ahead is None or self.norm(ahead.place - guess) >= off * step else ahead

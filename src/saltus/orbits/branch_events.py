@@ -68,6 +68,7 @@ class BranchLimits:
     impossible_pair: float = 1e-6
     # Distances in both directions along the parent's branch, tried in turn until they enclose its special point.
     reaches: tuple[float, ...] = tuple(10.0 ** np.arange(-8, -0.9))
+    sure: float = 0.3  # Those below this share of the distance expected are left out.
 
 
 SETTINGS = BranchLimits()
@@ -290,9 +291,14 @@ def parent_point(a: OrbitPoint, b: OrbitPoint) -> Zero | None:
     middle = curve.solve_at(guess, np.append(np.zeros(curve.problem.size), 1.0))
     if middle is None:
         return None
-    test = FLIP[problem.signature.symmetric]
-    for reach in SETTINGS.reaches:
+    test, least = FLIP[problem.signature.symmetric], 0.0
+    for reach in (reach for reach in SETTINGS.reaches if reach > least):
         ends = [middle.beside(sign * reach) for sign in (-1.0, 1.0)]
-        if ends[0] is not None and ends[1] is not None and test.value(ends[0]) * test.value(ends[1]) < 0.0:
+        if ends[0] is None or ends[1] is None:
+            continue
+        before, after = (test.value(end) for end in ends)
+        if before * after < 0.0:
             return located(test, ends[0], ends[1])
+        if before != after:  # the zero lies about as far as that of the line through both
+            least = SETTINGS.sure * reach * abs((before + after) / (after - before))
     return None
