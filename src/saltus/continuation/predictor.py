@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from saltus.continuation.curve import Point
@@ -29,13 +32,17 @@ def predicted(before: Point | None, point: Point, step: float) -> np.ndarray:
 
 def between(a: Point, b: Point, share: float) -> np.ndarray:
     """The place at a share of the way from a to b, on the cubic through both, or on their chord if the equations have changed."""
-    chord = b.place - a.place
+    return np.asarray(cubic(a, b)(share))
+
+
+def cubic(a: Point, b: Point, index: Any = slice(None)) -> Callable[[Any], Any]:
+    """`between` as a function of the share, or one component of it."""
+    start, chord = a.place[index], b.place[index] - a.place[index]
     if not a.curve.joins(b.curve):
-        return np.asarray(a.place + share * chord)
+        return lambda share: start + share * chord
     length = arc(a, b)
-    begin, end = length * a.tangent - chord, length * b.tangent - chord
-    rest = 1.0 - share
-    return np.asarray(a.place + share * chord + share * rest * (rest * begin - share * end))
+    begin, end = length * a.tangent[index] - chord, length * b.tangent[index] - chord
+    return lambda share: start + share * chord + share * (1.0 - share) * ((1.0 - share) * begin - share * end)
 
 
 def arc(a: Point, b: Point) -> float:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.continuation.predictor import between
+from saltus.continuation.predictor import between, cubic
 from saltus.continuation.step_length import STEPS
 from saltus.continuation.test_functions import TestFunction, located
 
@@ -39,7 +39,7 @@ def turning_point(a: Any, b: Any, index: int) -> Any:
     if not a.tangent[index] * b.tangent[index] < 0.0:
         return None
     shares = np.linspace(0.0, 1.0, 33)
-    values = np.array([between(a, b, share)[index] for share in shares])
+    values = cubic(a, b, index)(shares)
     place = int(np.argmax(values) if a.tangent[index] > 0.0 else np.argmin(values))
     return None if place in (0, len(shares) - 1) else _at_share(a, b, float(shares[place]))
 
@@ -75,11 +75,11 @@ def _at_share(a: Any, b: Any, share: float) -> Any:
 
 def _share(a: Any, b: Any, index: int, value: float) -> float:
     """The share of the way at which the cubic has the value, by bisection."""
-    low, high = 0.0, 1.0
+    low, high, component = 0.0, 1.0, cubic(a, b, index)
     below = a.place[index] < value
     while high - low > 1e-9:
         middle = 0.5 * (low + high)
-        if (between(a, b, middle)[index] < value) == below:
+        if (component(middle) < value) == below:
             low = middle
         else:
             high = middle

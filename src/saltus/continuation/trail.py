@@ -87,8 +87,8 @@ class Trail:
         if self.barrier is None or samples[-1].values[0] < 0.0 or len(self.last) == 1:  # a curve may begin on the barrier
             return samples
         samples = self.examined(samples)
-        beyond = next((i for i, sample in enumerate(samples) if i and sample.values[0] < 0.0), len(samples))
-        return samples[: beyond + 1]
+        beyond = next((i for i, sample in enumerate(samples) if i and sample.values[0] < 0.0), None)
+        return samples if beyond is None else samples[: beyond + 1]
 
     def up_to(self, samples: list[TrailPoint], ahead: Any) -> list[TrailPoint]:
         """The points of a step that ends at a point, given those of a longer one."""

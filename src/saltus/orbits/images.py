@@ -144,13 +144,14 @@ def renumbered(problem: Problem, unknowns: np.ndarray, other: OrbitPoint) -> np.
         return unknowns if signature == target else None
     pairs, best, least = unknowns.reshape(n, 2), None, math.inf
     goal = other.solution.unknowns.reshape(n, 2)
+    once = [np.array([turn * problem.closing, 0.0]) for turn in range(3)]
+    later = np.concatenate([pairs + shift for shift in once])  # the impacts of three (half) periods
+    next_sides = tuple(-side for side in signature.sides) if signature.symmetric else signature.sides
+    sides = signature.sides + next_sides + signature.sides
     for turn in range(n * (2 if signature.symmetric else 1)):
-        rolled = np.roll(pairs, -turn, axis=0)
-        flips = (turn + np.arange(n)) // n  # how often each has gone round the (half) period
-        sides = np.roll(signature.sides, -turn) * ((-1) ** flips if signature.symmetric else 1)
-        if tuple(sides) != tuple(target.sides):
+        if sides[turn : turn + n] != target.sides:
             continue
-        rolled = rolled + np.stack([flips * problem.closing, np.zeros(n)], axis=1)
+        rolled = later[turn : turn + n].copy()
         rolled[:, 0] += 2.0 * math.pi * round((goal[0, 0] - rolled[0, 0]) / (2.0 * math.pi))
         distance = float(np.abs(rolled - goal).max())
         if distance < least:

@@ -141,7 +141,9 @@ class Problem:
         """Whether the contact is no singularity for any values of the parameters at `paths`, so that orbits pass through it."""
         if self.signature.sides or not self.system.model.sides:
             return False
-        return contact_regularity(self._run.trace, tuple(self._values), self.paths) is ContactRegularity.CONTINUOUS
+        values = self._values.copy()
+        values[self._places] = 0.0  # The answer holds for all of them, and is then computed once.
+        return contact_regularity(self._run.trace, tuple(values), self.paths) is ContactRegularity.CONTINUOUS
 
     @property
     def values(self) -> np.ndarray:
@@ -237,7 +239,7 @@ class Problem:
         `later` are the unknowns asked for at the end of the period, if they differ from those at its beginning.
         """
         frequency, later = self.frequency(values), unknowns if later is None else later
-        if not (frequency > 0.0 and all(np.isfinite(numbers).all() for numbers in (unknowns, later, values))):
+        if not (frequency > 0.0 and math.isfinite(unknowns.sum() + later.sum() + values.sum())):
             return None
         segments = self._segments(unknowns, later, frequency)
         followed = self.follow_segments(segments, values, with_extremes)
