@@ -62,6 +62,19 @@ def growth(coefficients, first, last, size):
 
 
 @lean_jit
+def grow_faster(coefficients, first, last, size, rate):
+    """Whether `growth` exceeds a rate, found without the many logarithms of it."""
+    factor = math.exp(rate)
+    for i in range(coefficients.shape[0]):
+        bound = size * math.exp(first * rate)
+        for k in range(first, last + 1):
+            if abs(coefficients[i, k]) > bound:
+                return True
+            bound *= factor
+    return False
+
+
+@lean_jit
 def step_size(coefficients, order, size, tol):
     """The step h at which the last two terms of the series are tol, relative to `size`.
 
@@ -70,10 +83,9 @@ def step_size(coefficients, order, size, tol):
     """
     size = max(size, SMALLEST)
     at_end, before_end = growth(coefficients, order, order, size), growth(coefficients, order - 1, order - 1, size)
-    upper_half = growth(coefficients, order // 2, order - 2, size)
     step = min(math.log(tol) / order - at_end, math.log(tol) / (order - 1) - before_end)
-    if upper_half - max(at_end, before_end) > GAP:
-        step = min(step, math.log(tol) / order - upper_half)
+    if grow_faster(coefficients, order // 2, order - 2, size, max(at_end, before_end) + GAP):
+        step = min(step, math.log(tol) / order - growth(coefficients, order // 2, order - 2, size))
     return SAFETY * math.exp(step) if step < 700.0 else np.inf
 
 
