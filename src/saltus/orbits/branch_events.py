@@ -68,7 +68,6 @@ class BranchLimits:
     impossible_pair: float = 1e-6
     # Distances in both directions along the parent's branch, tried in turn until they enclose its special point.
     reaches: tuple[float, ...] = tuple(10.0 ** np.arange(-8, -0.9))
-    sure: float = 0.3  # Those below this share of the distance expected are left out.
 
 
 SETTINGS = BranchLimits()
@@ -300,5 +299,5 @@ def parent_point(a: OrbitPoint, b: OrbitPoint) -> Zero | None:
         if before * after < 0.0:
             return located(test, ends[0], ends[1])
         if before != after:  # the zero lies about as far as that of the line through both
-            least = SETTINGS.sure * reach * abs((before + after) / (after - before))
+            least = reach * abs((before + after) / (after - before))
     return None
