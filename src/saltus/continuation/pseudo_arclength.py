@@ -39,9 +39,9 @@ class EquationCurve(Curve[P]):
         `near` is that of `newton`."""
         normal, errors = direction * self.weights**2, list[float]()
 
-        def evaluate(place: np.ndarray, thorough: bool) -> Evaluation | None:
+        def within_reach(place: np.ndarray, thorough: bool) -> Evaluation | None:
             found = self.evaluate(place, thorough) if self.norm(place - guess) <= reach else None
-            if found is not None and reach < math.inf:
+            if found is not None:
                 errors.append(float(np.abs(found.residual).max()))
                 if len(errors) > 2 and NEWTON.stalled < errors[-1] > NEWTON.circling * errors[-3]:
                     return None
@@ -50,6 +50,7 @@ class EquationCurve(Curve[P]):
         def linear(found: Evaluation, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             return bordered(found.derivatives(), normal), -bordered(found.residual, normal @ (place - guess))
 
+        evaluate = self.evaluate if reach == math.inf else within_reach
         found = newton(evaluate, linear, guess, self.iterations, self.rounded, near)
         return None if found is None else self.with_tangent(found, direction)
 

@@ -229,6 +229,8 @@ def follow_segments_with(where, settings, env_of, model_of, arrays, spans, sides
     recording = extremes.shape[0] > 0
     for s in range(spans.shape[0]):
         begin, end, side, drift = spans[s, SEGMENT_START], spans[s, SEGMENT_END], float(sides[s, ALONG]), 0.0
+        if not math.isfinite(end - begin):
+            return s
         through = sides[s, BEFORE] == 0 and sides[s, ALONG] == 0
         if through:
             _, start = side_of_state(where[Where.SIDES], states[s, 0], states[s, own], model[ModelPart.GEOMETRY])

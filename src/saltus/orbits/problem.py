@@ -239,7 +239,7 @@ class Problem:
         `later` are the unknowns asked for at the end of the period, if they differ from those at its beginning.
         """
         frequency, later = self.frequency(values), unknowns if later is None else later
-        if not (frequency > 0.0 and math.isfinite(unknowns.sum() + later.sum() + values.sum())):
+        if not frequency > 0.0:
             return None
         segments = self._segments(unknowns, later, frequency)
         followed = self.follow_segments(segments, values, with_extremes)
@@ -247,7 +247,9 @@ class Problem:
             return None
         if not self.signature.sides:
             return self._shooting(later, frequency, followed)
-        return self._crossing(np.append(unknowns[3::2], later[1]), frequency, segments, followed)
+        following = np.empty(len(segments.spans))
+        following[:-1], following[-1] = unknowns[3::2], later[1]
+        return self._crossing(following, frequency, segments, followed)
 
     def carried(self, state: np.ndarray, begin: float, end: float, values: np.ndarray) -> np.ndarray | None:
         """The state at phase `end` of the smooth motion without impacts from a state at phase `begin`."""
@@ -286,6 +288,11 @@ class Problem:
         sides, along = self.signature.sides, self._along()
         return np.array(list(zip(sides or (0,), along, strict=True)), dtype=np.int64)
 
+    @cached_property
+    def _rate_of(self) -> np.ndarray:
+        """The place of each segment's side in `FollowedSegments.rates`, (n,)."""
+        return np.where(self._sides[:, 1] > 0, 0, 1)
+
     def _along(self) -> tuple[int, ...]:
         """The side of each segment; 0 stands for all sides, where the contact is passed through."""
         return (0,) if self.passes_contact else self.signature.along()
@@ -305,7 +312,7 @@ class Problem:
         """The equations of the impacts at the ends of the segments, at which the gap closes with the speeds `following`."""
         spans, (ends, columns, extremes, rates) = segments.spans, followed
         n, count = len(spans), len(self.paths)
-        sign = np.where(segments.sides[:, 1] > 0, rates[0], rates[1])
+        sign = rates[self._rate_of]
         residual, here, there = np.empty((n, 2)), np.empty((n, 2, 2)), np.empty((n, 2, 2))
         parameters = np.empty((n, 2, count))
         place = self.paths.index(FREQUENCY) if FREQUENCY in self.paths else -1
