@@ -226,11 +226,33 @@ def leading(coefficients, start, order):
 
 
 @jit
+def root_between(p, n, low, high, rises):
+    """The root of p in [low, high], where its sign changes once: from minus to plus if it `rises`."""
+    if not rises:
+        return newton(p, n, low, high)
+    for k in range(n + 1):  # `newton` starts where p is positive
+        p[k] = -p[k]
+    root = newton(p, n, low, high)
+    for k in range(n + 1):
+        p[k] = -p[k]
+    return root
+
+
+@jit
 def roots_within(p, n, roots, noise):
     """Fill `roots` with the places in (0, 1) at which a polynomial of degree n changes its sign by more than `noise`; returns
     their number."""
     if keeps_sign(p, n):
         return 0
+    steep, end = 0.0, p[0]
+    for k in range(1, n + 1):
+        steep += k * abs(p[k])
+        end += p[k]
+    if min(abs(p[0]), abs(end)) > noise and 2.0 * abs(p[1]) > steep * (1.0 + NOISE):  # it rises or falls everywhere
+        if p[0] * end > 0.0:
+            return 0
+        roots[0] = root_between(p, n, 0.0, 1.0, p[0] < 0.0)
+        return 1
     boxes = np.empty((DEPTH, n + 1))
     left, width = np.empty(DEPTH), np.empty(DEPTH)
     to_bernstein(p, n, boxes[0])
@@ -248,14 +270,7 @@ def roots_within(p, n, roots, noise):
         if count == 1 or wide < NARROW or top + 2 > DEPTH:
             if count % 2 == 0:
                 continue
-            if b[0] < 0.0:  # `newton` starts where p is positive
-                for k in range(n + 1):
-                    p[k] = -p[k]
-                roots[found] = newton(p, n, low, low + wide)
-                for k in range(n + 1):
-                    p[k] = -p[k]
-            else:
-                roots[found] = newton(p, n, low, low + wide)
+            roots[found] = root_between(p, n, low, low + wide, b[0] < 0.0)
             found += 1
             continue
         half = 0.5 * wide
