@@ -38,20 +38,8 @@ def horner_slope(c, n, x):
 
 
 @jit
-def excluded(p, n):
-    """Whether certainly p > 0 on [0, 1], because min(p0 + p1 u + p2 u^2) exceeds the sum of abs(p_k), k >= 3."""
-    rest = 0.0
-    for k in range(3, n + 1):
-        rest += abs(p[k])
-    low = min(p[0], p[0] + p[1] + p[2])
-    if p[2] > 0.0 and 0.0 < -p[1] < 2.0 * p[2]:
-        low = p[0] - p[1] * p[1] / (4.0 * p[2])
-    return low > rest
-
-
-@jit
 def keeps_sign(p, n):
-    """Whether certainly p != 0 on [0, 1], as `excluded` for either sign."""
+    """Whether certainly p != 0 on [0, 1]: because p0 + p1 u + p2 u^2 stays farther from 0 than the sum of abs(p_k), k >= 3."""
     sign, rest = (1.0 if p[0] > 0.0 else -1.0), 0.0
     for k in range(3, n + 1):
         rest += abs(p[k])
@@ -60,6 +48,12 @@ def keeps_sign(p, n):
     if third > 0.0 and 0.0 < -second < 2.0 * third:
         low = first - second * second / (4.0 * third)
     return low > rest
+
+
+@jit
+def excluded(p, n):
+    """Whether certainly p > 0 on [0, 1]."""
+    return p[0] > 0.0 and keeps_sign(p, n)
 
 
 @jit
