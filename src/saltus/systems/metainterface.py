@@ -130,11 +130,10 @@ class Metainterface(LayeredCell):
         margins = {"line_limit": opening - size, "kinematic_limit": 2 * opening - size}
         if self.smoothing is None:
             across, along = self._forces(t, (1 - side) / 2, load)
-            # The acceleration has these functions too: the sine and cosine of 2 beta0 + abs(theta) would be two more series.
-            sine, cosine = np.sin(size + self.beta0), np.cos(size + self.beta0)
+            angle = 2 * self.beta0 + size
             margins["reaction"] = (
-                side * ((cosine * np.cos(self.beta0) - sine * np.sin(self.beta0)) * acceleration)
-                - (sine * np.cos(self.beta0) + cosine * np.sin(self.beta0)) * (velocity * velocity)
+                side * (np.cos(angle) * acceleration)
+                - np.sin(angle) * (velocity * velocity)
                 + side * across * np.sin(self.beta0)
                 - along * np.cos(self.beta0)
             )
