@@ -48,6 +48,8 @@ class BranchSet:
     placed: list[PlacedBranch] = field(default_factory=list)
     grown: set[int] = field(default_factory=set)  # the branches whose special points were followed up
     partial: set[int] = field(default_factory=set)  # the branches that were followed only while they are stable
+    parts: set[int] = field(default_factory=set)  # the partial branches that turned out to be parts of others
+    compared: dict[int, int] = field(default_factory=dict)  # with how many branches each partial branch was compared
     left: int = 0  # special points at which a family is born that is not followed
 
     def follow(self, orbit: PeriodicOrbit, while_stable: bool = False) -> None:
@@ -78,18 +80,26 @@ class BranchSet:
     @property
     def branches(self) -> list[Branch]:
         """The branches, in the order in which they were followed, without those that turned out to be parts of others."""
-        return [placed.branch for placed in self.placed if not (id(placed) in self.partial and self._is_part(placed.branch))]
+        return [placed.branch for placed in self.placed if not (id(placed) in self.partial and self._is_part(placed))]
 
     @property
     def _whole(self) -> list[Branch]:
         """The branches that were followed all the way."""
         return [placed.branch for placed in self.placed if id(placed) not in self.partial]
 
-    def _is_part(self, branch: Branch) -> bool:
-        """Whether a branch that was followed only while it is stable is a part of one that was followed all the way."""
-        inner = branch.points[len(branch.points) // 2].orbit
-        value = float(inner.solution.values[0])
-        return any(other.holds(inner, value) for other in self.placed if id(other) not in self.partial)
+    def _is_part(self, partial: PlacedBranch) -> bool:
+        """Whether a branch that was followed only while it is stable is a part of one that was followed all the way.
+
+        It is compared only with the branches that are new since the last time.
+        """
+        key, points = id(partial), partial.branch.points
+        if key not in self.parts:
+            inner = points[len(points) // 2].orbit
+            value, new = float(inner.solution.values[0]), self.placed[self.compared.get(key, 0) :]
+            self.compared[key] = len(self.placed)
+            if any(other.holds(inner, value) for other in new if id(other) not in self.partial):
+                self.parts.add(key)
+        return key in self.parts
 
     def _continued(self, orbit: PeriodicOrbit, while_stable: bool = False) -> Branch:
         return self.work.follow([self.request(orbit, while_stable)])[0][0]

@@ -54,16 +54,37 @@ class PlacedBranch:
         """Whether a smooth curve leads from each point to the next, (n - 1,)."""
         return np.array([self.branch.is_joined(i) for i in range(len(self.branch.points) - 1)], dtype=bool)
 
+    @cached_property
+    def _joins(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The points that a smooth curve joins to the next one, and the least and the largest parameter between the two, (m,)."""
+        parameter, usable = self.columns[0], np.flatnonzero(self.joined)
+        return usable, *np.sort([parameter[usable], parameter[usable + 1]], axis=0)
+
+    @cached_property
+    def _stable_joins(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Those of `_joins` of which one of the two points is stable."""
+        usable, low, high = self._joins
+        counts = (self.columns[3, usable] > 0) | (self.columns[3, usable + 1] > 0)
+        return usable[counts], low[counts], high[counts]
+
+    @cached_property
+    def _reach(self) -> tuple[float, float, set[float]]:
+        """The least and the largest parameter, and the periods of the orbits."""
+        parameter, period = self.columns[0], self.columns[4]
+        return float(parameter.min()), float(parameter.max()), set(period.tolist())
+
+    def may_hold(self, low: float, high: float, periods: set[int]) -> bool:
+        """Whether an orbit of one of these periods, at a value from `low` to `high`, may lie on the branch: a fast test, as most
+        orbits are looked for on a hundred branches and are far from nearly all of them."""
+        least, most, own = self._reach
+        return least <= high and low <= most and not own.isdisjoint(periods)
+
     def crossings(self, values: np.ndarray, stable: bool = True) -> tuple[np.ndarray, np.ndarray]:
         """Where the branch passes the values: the indices of the values, and those of the branch's points before them.
 
         With `stable`, one of the points on both sides of a value must be stable.
         """
-        parameter, counts = self.columns[0], (self.columns[3] > 0) | (not stable)
-        if len(parameter) < 2:
-            return np.empty(0, dtype=int), np.empty(0, dtype=int)
-        usable = np.flatnonzero(self.joined & (counts[:-1] | counts[1:]))
-        low, high = np.sort([parameter[usable], parameter[usable + 1]], axis=0)
+        usable, low, high = self._stable_joins if stable else self._joins
         order = np.argsort(values)
         first, last = np.searchsorted(values[order], low, "left"), np.searchsorted(values[order], high, "right")
         number = last - first
@@ -101,6 +122,8 @@ class PlacedBranch:
 
     def holds(self, orbit: PeriodicOrbit, value: float) -> bool:
         """Whether an orbit at a value of the parameter, stable or not, or its mirror image, lies on the branch."""
+        if not self.may_hold(value, value, {orbit.period}):
+            return False
         seen = _seen(orbit)
         for before in self.crossings(np.array([value]), stable=False)[1].tolist():
             expected, _, change = self.extrema(np.array([value]), np.array([before]))
@@ -124,7 +147,7 @@ def _lagrange(nodes: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarr
     """Lagrange's polynomials of degree m - 1 through values (n, k, m) at nodes (k, m), each at its place `at` (k,), (n, k)."""
     result = np.zeros(values.shape[:2])
     for i in range(nodes.shape[1]):
-        others = np.delete(nodes, i, axis=1)
+        others = nodes[:, [j for j in range(nodes.shape[1]) if j != i]]
         result += values[..., i] * np.prod((at[:, None] - others) / (nodes[:, i, None] - others), axis=1)
     return result
 
@@ -173,7 +196,8 @@ def placed(motions: SimulatedMotions, branches: list[PlacedBranch], mirrored: bo
     least = SETTINGS.slow if branches and branches[0].branch.orbits[0].system.model.contacts else 0.0
     every = np.stack([motions.highest, motions.lowest, np.maximum(motions.slowest, least)], axis=1)
     sizes = np.maximum(motions.amplitude, SETTINGS.least)
-    for branch in branches:
+    low, high, periods = motions.value.min(initial=np.inf), motions.value.max(initial=-np.inf), set(motions.period.tolist())
+    for branch in (branch for branch in branches if branch.may_hold(low, high, periods)):
         rows, before = branch.crossings(motions.value)
         rows, before = (each[~result[rows] & (motions.period[rows] == branch.columns[4, before])] for each in (rows, before))
         expected, uncertain, change = branch.extrema(motions.value[rows], before)
