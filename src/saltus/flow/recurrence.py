@@ -215,9 +215,30 @@ def find_recurrence(
 
 
 def motions_from(system: System, states: np.ndarray, **options: Any) -> xarray.Dataset:
-    """`simulate_many` from states (n, d) at phase 0."""
+    """`simulate_many` from states (n, d) at phase 0; `ensemble_from` is faster."""
     coordinates, velocity = _as_arguments(system, states)
     return simulate_many(system, **coordinates, velocity=velocity, **options)
+
+
+def ensemble_from(
+    system: System,
+    states: np.ndarray,
+    periods: int,
+    *,
+    parameters: Mapping[str, np.ndarray],
+    tol: float,
+    until: tuple[str, ...] = (),
+    derivatives: bool = False,
+) -> EnsembleResult:
+    """The ends of motions from states (n, d) at phase 0 as arrays: making a dataset takes longer than following a few motions.
+
+    With `derivatives` those to the initial states are computed, too.
+    """
+    paths = () if derivatives else None
+    wanted = Wanted(tol=tol, periods=periods, limits=limits_of(system, ()), until=until, paths=paths)
+    coordinates, velocity = _as_arguments(system, states)
+    inputs = read_inputs(system, velocity, 0.0, parameters, coordinates)
+    return run_ensemble(system, inputs, wanted, read_threads(None), silent)
 
 
 def _as_arguments(system: System, states: np.ndarray) -> tuple[dict[str, Any], Any]:

@@ -13,7 +13,7 @@ import numpy as np
 from saltus.attractors.lyapunov.perturbations import Perturbations
 from saltus.attractors.lyapunov.settings import LYAPUNOV
 from saltus.attractors.lyapunov.stretching import stretched
-from saltus.flow import Stop, last_states, motions_from, stop_names
+from saltus.flow import Stop, ensemble_from
 from saltus.orbits import states_beside
 
 
@@ -47,10 +47,9 @@ class Neighbours(Perturbations):
         here, away = self.here[motions], LYAPUNOV.distance * self.direction[motions]
         beside = states_beside(self.system, here, away)
         twice = {path: np.tile(values[motions], 2) for path, values in self.columns.items()}
-        options = {"parameters": twice, "periods": periods, "sample": (), "tol": self.tol}
-        ends = motions_from(self.system, np.concatenate([here, beside]), **options)
-        moving = (ends["side"].values != 0) & (stop_names(ends) == Stop.HORIZON)
-        first, second = last_states(self.system, ends).reshape(2, *here.shape)
+        ends = ensemble_from(self.system, np.concatenate([here, beside]), periods, parameters=twice, tol=self.tol)
+        moving = (ends.side != 0) & ends.stopped(Stop.HORIZON)
+        first, second = ends.last.reshape(2, *here.shape)
         going = moving.reshape(2, -1).all(axis=0) & np.isfinite(first).all(axis=1)
         with np.errstate(invalid="ignore", divide="ignore"):
             factor = np.linalg.norm(second - first, axis=1) / np.linalg.norm(beside - here, axis=1)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from saltus.attractors.lyapunov.perturbations import Perturbations
-from saltus.flow import Stop, last_states, motions_from, stop_names
+from saltus.flow import Stop, ensemble_from
 from saltus.systems import System
 
 
@@ -38,17 +38,16 @@ def stretched(
     if not here.any():
         return later, turned, growth
     chosen = {path: values[here] for path, values in columns.items()}
-    options = {"parameters": chosen, "periods": periods, "sensitivities": (), "sample": (), "until": ("rest",), "tol": tol}
-    ends = motions_from(system, states[here], **options)
+    ends = ensemble_from(system, states[here], periods, parameters=chosen, tol=tol, until=("rest",), derivatives=True)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        grown = np.einsum("nij,nj->ni", ends["derivative"].values, direction[here])
+        grown = np.einsum("nij,nj->ni", ends.derivatives, direction[here])
         size = np.abs(grown).max(axis=1, keepdims=True)  # squares of perturbations that have grown by 1e200 would overflow
         length = size[:, 0] * np.linalg.norm(grown / np.where(size > 0.0, size, 1.0), axis=1)
         # Motions that are captured at rest are given up, as following their impacts to the rest would take millions of these.
-        moving = (ends["side"].values != 0) & (stop_names(ends) != Stop.CAPTURED)
+        moving = (ends.side != 0) & ~ends.stopped(Stop.CAPTURED)
         gone = length == 0.0 if system.model.held else np.zeros(length.shape, dtype=bool)
         going = moving & np.isfinite(length) & ((length > 0.0) | gone)
         growth[here] = np.where(going, np.log(np.maximum(length, np.finfo(float).tiny)), np.nan)
         turned[here] = np.where(gone[:, None], direction[here], grown / length[:, None])
-    later[here] = np.where(going[:, None], last_states(system, ends), np.nan)
+    later[here] = np.where(going[:, None], ends.last, np.nan)
     return later, turned, growth

@@ -6,15 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.flow.ensemble.lane_layout import EndLabel, EndNumber, JobNumber
+from saltus.flow.ensemble.lane_layout import EndLabel, EndNumber
 from saltus.flow.ensemble.wanted import Sample, Until
-from saltus.flow.kernel_layout import Mode, Status
+from saltus.flow.kernel_layout import Status
 from saltus.flow.motion_dataset import rate_name, state_names
 from saltus.flow.stops import Stop
 from saltus.flow.validity import GAIN_ROUNDING
 from saltus.provenance import provenance
 from saltus.systems import energy_gains, substitute
-from saltus.taylor import FREQUENCY
 
 if TYPE_CHECKING:
     import xarray
@@ -108,11 +107,11 @@ def _add_ends(writer: _Writer, result: EnsembleResult) -> None:
         writer.add(name, last[:, i], writer.units[name], f"{name} at the end")
         writer.add(rate, last[:, own + i], writer.units[rate], f"d {name} / d tau at the end")
     writer.add("time", result.time, "1", "dimensionless time tau at the end")
-    side, names = ends.of(EndLabel.SIDE), [contact.name for contact in result.system.model.contacts]
+    names = [contact.name for contact in result.system.model.contacts]
     if names:
-        writer.add("closed_contacts", (side - 1).astype(np.int16), "1", "contacts that are closed at the end", **_masks(names))
-        side = np.ones_like(side)
-    writer.add("side", np.where(result.held, 0, side).astype(np.int8), "1", "side at the end, 0 at rest")
+        closed = (ends.of(EndLabel.SIDE) - 1).astype(np.int16)
+        writer.add("closed_contacts", closed, "1", "contacts that are closed at the end", **_masks(names))
+    writer.add("side", result.side.astype(np.int8), "1", "side at the end, 0 at rest")
     writer.add("impact_count", ends.of(EndLabel.IMPACTS), "1", "impacts")
     writer.add("grazings", ends.of(EndLabel.GRAZINGS), "1", "touches of the contact without an impact")
     if result.periods is not None:
@@ -200,29 +199,7 @@ def _add_samples(writer: _Writer, result: EnsembleResult) -> None:
 
 
 def _add_derivatives(writer: _Writer, result: EnsembleResult, paths: tuple[str, ...]) -> None:
-    """The derivatives of the end state to the initial one and to parameters, (..., state, column).
-
-    The time at the start is fixed, and so is the time at the end, with two exceptions. If periods were asked for and the motion
-    ends after n of them, its end, start + n 2 pi / W, moves with the frequency W. If it ends at a margin, the end moves with the
-    margin.
-    """
+    """The derivatives of the end state to the initial one and to parameters, (..., state, column)."""
     states = [*writer.names, *writer.rates]
-    ends, own, rows, columns = result.ends, len(writer.names), result.rows, [*states, *paths]
-    q = ends.states[:, own:rows].reshape(-1, len(columns), own)
-    v = ends.states[:, rows + own :].reshape(-1, len(columns), own)
-    derivative = np.concatenate([q, v], axis=2).transpose(0, 2, 1).copy()
-    rates = ends.numbers[:, EndNumber.RATES : EndNumber.RATES + own]
-    shifts = ends.numbers[:, EndNumber.RATES + own :]
-    slope = np.concatenate([result.last[:, own:], rates], axis=1)
-    limited = ends.of(EndLabel.STATUS) == Status.LIMITED
-    with np.errstate(invalid="ignore"):  # the instant at which a margin is reached without speed has no derivative
-        derivative[limited] += slope[limited, :, None] * shifts[limited, None, :]
-    if result.wanted.periods is not None and FREQUENCY in paths:
-        at_period_end = np.isin(ends.of(EndLabel.STATUS), (Status.DONE, Status.SETTLED))
-        moving = at_period_end & (ends.of(EndLabel.MODE) == Mode.ARC)
-        length = result.jobs.numbers[:, JobNumber.PERIOD_LENGTH]
-        span = result.whole_periods * length + result.elapsed
-        shift = np.where(moving, -span * length / (2.0 * np.pi), 0.0)  # of the end, -span / W
-        derivative[:, :, columns.index(FREQUENCY)] += np.where(moving[:, None], shift[:, None] * slope, 0.0)
-    writer.coords |= {"state": ("state", states), "column": ("column", columns)}
-    writer.add("derivative", derivative, "1", "derivative of the state at the end", "state", "column")
+    writer.coords |= {"state": ("state", states), "column": ("column", [*states, *paths])}
+    writer.add("derivative", result.derivatives, "1", "derivative of the state at the end", "state", "column")

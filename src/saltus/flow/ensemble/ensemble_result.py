@@ -14,6 +14,7 @@ from saltus.flow.ensemble.wanted import Sample, Wanted
 from saltus.flow.kernel_layout import Mode, Status
 from saltus.flow.stops import Stop
 from saltus.systems import System
+from saltus.taylor import FREQUENCY
 
 STOPS = {
     Status.DONE: Stop.HORIZON,
@@ -56,6 +57,12 @@ class EnsembleResult:
         """Which trajectories are held at the contact at the end, at rest or in chatter, (n,)."""
         mode = self.ends.of(EndLabel.MODE)
         return np.asarray((mode == Mode.REST) | (mode == Mode.CHATTER))
+
+    @property
+    def side(self) -> np.ndarray:
+        """The side of the contact at the end, 0 at rest; with several contacts 1 if the motion is not at rest, (n,)."""
+        side = self.ends.of(EndLabel.SIDE)
+        return np.where(self.held, 0, np.ones_like(side) if self.system.model.contacts else side)
 
     @property
     def time(self) -> np.ndarray:
@@ -113,3 +120,31 @@ class EnsembleResult:
             found[kind] = samples[:, :, column : column + width]
             column += width
         return found
+
+    @cached_property
+    def derivatives(self) -> np.ndarray:
+        """The derivatives of the end state to the initial one and to the parameters that were asked for, (n, d, d + parameters).
+
+        The time at the start is fixed, and so is the time at the end, with two exceptions. If periods were asked for and the
+        motion ends after n of them, its end, start + n 2 pi / W, moves with the frequency W. If it ends at a margin, the end
+        moves with the margin.
+        """
+        paths = self.wanted.paths or ()
+        ends, own, rows = self.ends, len(self.system.model.coordinates), self.rows
+        q = ends.states[:, own:rows].reshape(-1, 2 * own + len(paths), own)
+        v = ends.states[:, rows + own :].reshape(-1, 2 * own + len(paths), own)
+        derivatives = np.concatenate([q, v], axis=2).transpose(0, 2, 1).copy()
+        rates = ends.numbers[:, EndNumber.RATES : EndNumber.RATES + own]
+        shifts = ends.numbers[:, EndNumber.RATES + own :]
+        slope = np.concatenate([self.last[:, own:], rates], axis=1)
+        limited = ends.of(EndLabel.STATUS) == Status.LIMITED
+        with np.errstate(invalid="ignore"):  # the instant at which a margin is reached without speed has no derivative
+            derivatives[limited] += slope[limited, :, None] * shifts[limited, None, :]
+        if self.wanted.periods is not None and FREQUENCY in paths:
+            at_period_end = np.isin(ends.of(EndLabel.STATUS), (Status.DONE, Status.SETTLED))
+            moving = at_period_end & (ends.of(EndLabel.MODE) == Mode.ARC)
+            length = self.jobs.numbers[:, JobNumber.PERIOD_LENGTH]
+            span = self.whole_periods * length + self.elapsed
+            shift = np.where(moving, -span * length / (2.0 * np.pi), 0.0)  # of the end, -span / W
+            derivatives[:, :, 2 * own + paths.index(FREQUENCY)] += np.where(moving[:, None], shift[:, None] * slope, 0.0)
+        return derivatives
