@@ -6,8 +6,9 @@ import math
 import os
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,7 @@ class ThreadSettings:
     # threads end at about the same time.
     chunks_ahead: int = 2
     look_interval: float = 0.1  # Seconds between looks at Ctrl-C and at the progress.
+    most_threads: int = 256  # The most threads of all ensembles that run at the same time.
 
 
 SETTINGS = ThreadSettings()
@@ -103,6 +105,15 @@ def available_cores() -> int:
     return max(1, cores // max(1, _sharing[0]()))
 
 
+@cache
+def _pool(process: int) -> ThreadPoolExecutor:
+    """The threads of a process, kept because starting one takes as long as a short ensemble; a forked process needs its own.
+
+    A thread is started where none is idle, so that ensembles that run at the same time do not wait for one another.
+    """
+    return ThreadPoolExecutor(SETTINGS.most_threads, thread_name_prefix="saltus")
+
+
 @dataclass(frozen=True)
 class Lanes:
     """A structure ready to run in lanes, with the settings that are the same for all of its trajectories."""
@@ -138,18 +149,20 @@ class Lanes:
         waiting, lock = chunks(n, threads, self.kept), threading.Lock()
         compile_everything(self.several)  # here, not in each thread
         progress(0.0, WHAT)
-        with ThreadPoolExecutor(threads) as pool:
-            try:  # an interrupt while they are begun must stop them too, or the pool would wait for their end
-                workers = [pool.submit(self._work, jobs, ends, waiting, lock, control) for control in controls]
-                while wait(workers, SETTINGS.look_interval).not_done:
-                    if total > 0:
-                        progress(min(1.0, sum(int(c[1]) for c in controls) / total), WHAT)
-            except BaseException:
-                for control in controls:
-                    control[0] = 1
-                raise
-            for worker in workers:
-                worker.result()
+        pool, workers = _pool(os.getpid()), list[Future[None]]()
+        try:  # an interrupt while they are begun must stop them, too
+            for control in controls:
+                workers.append(pool.submit(self._work, jobs, ends, waiting, lock, control))
+            while wait(workers, SETTINGS.look_interval).not_done:
+                if total > 0:
+                    progress(min(1.0, sum(int(c[1]) for c in controls) / total), WHAT)
+        except BaseException:
+            for control in controls:
+                control[0] = 1
+            wait(workers)
+            raise
+        for worker in workers:
+            worker.result()
         progress(1.0, WHAT)
         return ends
 
