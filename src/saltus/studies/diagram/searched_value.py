@@ -26,6 +26,7 @@ class SearchedValue:
     chaos: np.ndarray = field(default_factory=lambda: np.empty((0, 0)), compare=False)  # (n, d): states of unsettled motions
     # Period, number of impacts, amplitude and state at phase 0 of each motion that has settled.
     orbits: list[tuple[int, int, float, np.ndarray]] = field(default_factory=list, compare=False)
+    longest_orbit: int = field(default=0, compare=False)  # the longest of their periods, which is asked for very often
 
     @property
     def chaotic(self) -> bool:
@@ -45,14 +46,14 @@ class SearchedValue:
     @property
     def goes_on(self) -> bool:
         """Whether motions here are chaotic or may be so, or have a longer period than all motions that have settled."""
-        long = self.period > max((orbit[0] for orbit in self.orbits), default=0)
-        open_ = self.verdict in (Unsettled.CHAOTIC, Unsettled.UNDECIDED)
-        return open_ or (self.verdict is Unsettled.PERIODIC and long)
+        if self.verdict is Unsettled.PERIODIC:
+            return self.period > self.longest_orbit
+        return self.verdict in (Unsettled.CHAOTIC, Unsettled.UNDECIDED)
 
     @property
     def longest(self) -> int:
         """The longest period of the motions that settle, in forcing periods."""
-        return max(self.period, *(orbit[0] for orbit in self.orbits), 0)
+        return max(self.period, self.longest_orbit)
 
     def judge(self, judged: Judged, row: int, care: int) -> None:
         """Take the verdict on the unsettled motions here, unless an earlier judgement was more careful, or as careful and found a
@@ -71,6 +72,7 @@ class SearchedValue:
             if (q, n) == (period, impacts) and abs(size - amplitude) <= 1e-4 * size:
                 return
         self.orbits.append((period, impacts, amplitude, state))
+        self.longest_orbit = max(self.longest_orbit, period)
 
     def starts(self, seeds: int, orbits: int) -> np.ndarray:
         """States from which motions at neighbouring values are begun, (n, d)."""
