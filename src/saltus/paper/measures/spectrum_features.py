@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from saltus.branch_lines import BranchLine, branch_lines, smooth_lines
-from saltus.branch_tables import branches_of
+from saltus.branch_tables import branch_of, branches_of
 
 PROMINENT = 0.05  # least height of a resonance above the minima beside it, as a share of the highest amplitude
 FREE_ENDS = {"closed", "bound"}  # the end reasons of a branch that is connected to no other
@@ -24,18 +24,25 @@ def within(spectrum: Any, branch: Any) -> np.ndarray:
 
 def main_branch(spectrum: Any) -> Any:
     """The period-1 branch that covers most of the range."""
-    bounds = spectrum.attrs.get("bounds", (-np.inf, np.inf))  # a tree of branches alone has no bounds
-    branches = [branch for _, branch in branches_of(spectrum) if int(branch["period"][0]) == 1]
-    return max(branches, key=lambda branch: np.ptp(np.clip(branch["parameter"].values, *bounds)))
+    return branch_of(spectrum, _main_number(spectrum))
+
+
+def _main_number(spectrum: Any) -> int:
+    """The number of the main branch, from the table of all points: making a dataset of every branch takes much longer."""
+    points, bounds = spectrum["points"], spectrum.attrs.get("bounds", (-np.inf, np.inf))  # a tree of branches alone has no bounds
+    number, values = points["branch"].values, np.clip(points["parameter"].values, *bounds)
+    first = np.flatnonzero(np.diff(number, prepend=-1))
+    covered = np.maximum.reduceat(values, first) - np.minimum.reduceat(values, first)
+    simple = points["period"].values[first] == 1
+    return int(number[first][simple][np.argmax(covered[simple])])
 
 
 def detached(spectrum: Any) -> list[tuple[int, Any]]:
     """The branches that no special point connects to another one and that reach into the range, without the main branch."""
-    found, main = [], main_branch(spectrum)
+    found, main = [], _main_number(spectrum)
     for number, branch in branches_of(spectrum):
         free = FREE_ENDS.issuperset(np.atleast_1d(branch.attrs["end_reasons"]).tolist())
-        same = branch.equals(main)
-        if branch.attrs["origin"] == "start" and free and not same and within(spectrum, branch).any():
+        if branch.attrs["origin"] == "start" and free and number != main and within(spectrum, branch).any():
             found.append((number, branch))
     return found
 
