@@ -280,6 +280,8 @@ class _Law:
         here = [replace(always, stretch=Interval(impacts.stretch[s])).only(chosen) for s in cycle]
         pulls = [enclose([self.sides[s].jets[0][0]], self._in_cells(x))[0] for s, x in zip(cycle, here, strict=True)]
         alive = np.flatnonzero(reduce(np.minimum, [(p.lo + result).min(axis=0) for p in pulls]) > 0)
+        if not alive.size:  # the load lifts the system off everywhere; bounds of no parameter sets take as long as those of a few
+            return result
         here = [self._in_cells(x.only(alive)) for x in here]
         bounds = [self.sides[s].bounds(x) for s, x in zip(cycle, here, strict=True)]
         forms = [normal_form(side, None if len(cycle) == 1 else bounds[1 - i]) for i, side in enumerate(bounds)]
