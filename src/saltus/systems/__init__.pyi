@@ -11,7 +11,7 @@ from .metainterface import Metainterface
 from .mirror import contact_images, image_of
 from .model import MarginKind, Model
 from .newton_impact import NewtonImpact, energy_gain, energy_gains
-from .parameter_tables import broadcast_arrays, check_parameters, finite_array, parameter_table
+from .parameter_tables import broadcast_arrays, check_parameters, distinct_rows, finite_array, parameter_table
 from .parameters import children, is_number, numbers, substitute
 from .pulse import Pulse
 from .pulses import Chirp, HalfSine, MavroeidisPapageorgiou, OneCosine, OneSine, Ramp, Ricker
@@ -81,6 +81,7 @@ __all__ = [
     "children",
     "constrained_acceleration",
     "contact_images",
+    "distinct_rows",
     "energy_gain",
     "energy_gains",
     "finite_array",

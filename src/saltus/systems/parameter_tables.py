@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -50,9 +50,22 @@ def check_parameters(system: System, columns: Mapping[str, np.ndarray]) -> None:
         if path.endswith(".order") and not np.equal(values, np.round(values)).all():
             raise ParameterError(f"{path} must be whole numbers", "parameters")
     if columns and all(a.size for a in columns.values()):
-        rows = np.unique(np.stack(np.broadcast_arrays(*(np.atleast_1d(a) for a in columns.values())), axis=1), axis=0)
+        rows, _ = distinct_rows(np.broadcast_arrays(*(np.atleast_1d(a) for a in columns.values())))
         for i in _chosen(rows):
             system.with_(dict(zip(columns, rows[i].tolist(), strict=True)))
+
+
+def distinct_rows(columns: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """The different rows of columns (n,) in rising order, (m, columns), and the place of each row among them, (n,).
+
+    It does what `np.unique` does along an axis, which takes ten times as long.
+    """
+    order = np.lexsort(columns[::-1])
+    rows = np.stack(columns, axis=1)[order]
+    fresh, place = np.ones(len(rows), dtype=bool), np.empty(len(rows), dtype=int)
+    fresh[1:] = (rows[1:] != rows[:-1]).any(axis=1)
+    place[order] = np.cumsum(fresh) - 1
+    return rows[fresh], place
 
 
 def _chosen(rows: np.ndarray) -> Iterable[int]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import ParameterError
-from saltus.systems import System
+from saltus.systems import System, distinct_rows
 
 MOST_SYSTEMS, MOST_PROVED = 16, 1 << 18  # the most systems, and parameter sets of each, whose capture speeds are kept
 
@@ -72,7 +72,7 @@ def _remembered(system: System, columns: Mapping[str, np.ndarray]) -> np.ndarray
     varied = {path: values for path, values in sorted(columns.items()) if values.ndim}
     if not varied:
         return proved_speeds(system, columns)
-    sets, place = np.unique(np.stack(list(varied.values()), axis=1), axis=0, return_inverse=True)
+    sets, place = distinct_rows(list(varied.values()))
     single = {path: float(values) for path, values in columns.items() if not values.ndim}
     if len(_proved) >= MOST_SYSTEMS:
         _proved.clear()
@@ -85,7 +85,7 @@ def _remembered(system: System, columns: Mapping[str, np.ndarray]) -> np.ndarray
             new = list(range(len(rows)))
         distinct = dict(zip(varied, sets[new].T, strict=True))
         known.update(zip((rows[i] for i in new), proved_speeds(system, {**columns, **distinct}).tolist(), strict=True))
-    return np.array([known[row] for row in rows])[place.reshape(-1)]
+    return np.array([known[row] for row in rows])[place]
 
 
 _proved: dict[tuple[Any, ...], dict[bytes, float]] = {}
