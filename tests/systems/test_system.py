@@ -26,6 +26,7 @@ from saltus.systems import (
     TwoLayer,
     VelocityReduction,
     WallOscillator,
+    distinct_rows,
     register,
 )
 from saltus.systems.signals import scaled
@@ -328,3 +329,13 @@ def test_a_mirror_that_is_no_symmetry_is_refused(numbers):
     assert System(model=Lopsided(beta0=1.4), load=load).mirrored() is not None
     with pytest.raises(ParameterError, match="mirror is no symmetry"):
         System(model=Lopsided(beta0=1.4, **numbers), load=load).mirrored()
+
+
+@pytest.mark.parametrize("size", [0, 1, 300])
+@pytest.mark.parametrize("count", [1, 3])
+def test_different_rows_are_those_of_numpy(count, size):
+    columns = list(np.random.default_rng(1).integers(-2, 3, (count, size)) * 0.1)
+    rows, place = distinct_rows(columns)
+    expected, there = np.unique(np.stack(columns, axis=1), axis=0, return_inverse=True)
+    np.testing.assert_array_equal(rows, expected)
+    np.testing.assert_array_equal(place, there.reshape(-1))

@@ -85,7 +85,7 @@ def _remembered(system: System, columns: Mapping[str, np.ndarray]) -> np.ndarray
             new = list(range(len(rows)))
         distinct = dict(zip(varied, sets[new].T, strict=True))
         known.update(zip((rows[i] for i in new), proved_speeds(system, {**columns, **distinct}).tolist(), strict=True))
-    return np.array([known[row] for row in rows])[place]
+    return np.asarray(np.array([known[row] for row in rows])[place])
 
 
 _proved: dict[tuple[Any, ...], dict[bytes, float]] = {}
