@@ -29,9 +29,8 @@ class SimulationSettings:
     # An unsettled motion is taken as slow, not chaotic, if it returns to an earlier state within this share of its amplitude.
     slow: float = 1e-2
     patience: int = 8  # Slow motions are followed for this many times the forcing periods of the others.
-    # With several contacts or frictions chaotic motions return as near, too, and their impacts take long to follow. There a slow
-    # motion is followed in rounds, as long as each round reduces the distance of its return by this factor; otherwise it can
-    # hardly settle in the time that is left.
+    # Chaotic motions return as near by chance. A slow motion is followed in rounds, as long as each round reduces the distance of
+    # its return by this factor; otherwise it can hardly settle in the time that is left.
     nearer: float = 0.3
     still: float = 1e-6  # A motion that stays this near to the contact is at rest.
     tol: float = 1e-11  # The error of a step: a tenth of the distance within which the lanes take states as the same.
@@ -134,11 +133,10 @@ def simulate_from(
     follow = follow or partial(followed, system, path)
     found = follow(values, states, periods, progress)
     slow = np.flatnonzero(found.unsettled & _is_slow(found))
-    rounds = SETTINGS.patience if system.model.held else 1
-    for _ in range(rounds):
+    for _ in range(SETTINGS.patience):
         if slow.size:
             before = _return_distance(found.only(slow))
-            found.gone_on(slow, follow(values[slow], found.last[slow], SETTINGS.patience * periods // rounds, silent))
+            found.gone_on(slow, follow(values[slow], found.last[slow], periods, silent))
             later = found.only(slow)
             slow = slow[later.unsettled & (_return_distance(later) <= SETTINGS.nearer * before)]
     return found
