@@ -150,8 +150,8 @@ def processes(monkeypatch):
 
 
 def verdicts_of(on_attractor, settings=JUDGEMENT, count=200):
-    """The verdicts of questions of which so many of 24 companions are on the attractor, whose exponent is known."""
-    states = np.zeros((count, 24, 2))
+    """The verdicts of questions of which so many companions are on the attractor, whose exponent is known."""
+    states = np.zeros((count, settings.companions, 2))
     states[:, :on_attractor, 0] = 1.0
     known = Earlier(np.full(count, 0.1), np.full(count, 0.01), np.zeros(count))
     return judge_unsettled(forced(0.2), states, {AMPLITUDE: np.full(count, 0.2)}, settings=settings, earlier=known).verdict
@@ -166,6 +166,17 @@ def test_a_transient_is_told_without_waiting_for_an_attractor_that_is_not_there(
 
 
 def test_an_attractor_beside_a_transient_is_seen_as_ever_fewer_motions_settle(processes):
-    """Of the companions that are not on it exp(-1/2) are left after each round: after twelve rounds all but a few are on it."""
-    assert (verdicts_of(24) == Unsettled.CHAOTIC).all()
-    assert (verdicts_of(8) == Unsettled.CHAOTIC).mean() > 0.75
+    """Of the companions that are not on it exp(-3/4) are left after each round: after some rounds all but a few are on it."""
+    assert (verdicts_of(JUDGEMENT.companions) == Unsettled.CHAOTIC).all()
+    assert (verdicts_of(JUDGEMENT.companions // 3) == Unsettled.CHAOTIC).mean() > 0.8
+
+
+def test_fewer_companions_in_longer_rounds_see_an_attractor_more_surely_in_less_time(processes):
+    """At the same work in a round, transients have more time to end."""
+    wrong, work = [], []
+    for settings in (JUDGEMENT, replace(JUDGEMENT, companions=24, round_periods=1000)):
+        processes.clear()
+        wrong.append((verdicts_of(settings.companions // 3, settings) != Unsettled.CHAOTIC).mean())
+        work.append(sum(processes))
+    assert wrong[0] < 0.5 * wrong[1]
+    assert work[0] < work[1]

@@ -36,8 +36,8 @@ class ChaosSettings:
     # of the judgement before; if none settles, the second one then takes one round, and the third one three.
     judgements: tuple[JudgementSettings, ...] = (
         replace(JUDGEMENT, companions=8, exposure=2000, round_periods=500, rounds=2),
-        replace(JUDGEMENT, companions=16, exposure=20_000, round_periods=1125),
-        replace(JUDGEMENT, exposure=100_000, round_periods=1125),
+        replace(JUDGEMENT, companions=12, exposure=20_000, round_periods=1500),
+        replace(JUDGEMENT, exposure=100_000, round_periods=1690),
     )
     # The values of a band within this share of the range are judged together, by the sum of the forcing periods in which none of
     # their motions has settled.
