@@ -48,3 +48,15 @@ def part_of(progress: Progress, begin: float, end: float, what: str | None = Non
         return progress(begin + (end - begin) * fraction, step if what is None else what)
 
     return show
+
+
+def growing(progress: Progress) -> Progress:
+    """A progress whose fraction never falls, for work of which some parts turn out to be longer than expected."""
+    most = 0.0
+
+    def show(fraction: float, step: str) -> object:
+        nonlocal most
+        most = max(most, fraction)
+        return progress(most, step)
+
+    return show

@@ -63,7 +63,7 @@ def test_a_cascade_of_long_periods_is_followed_to_its_chaos_beside_another_attra
     search = BandSearch(DiagramWork(system, FREQUENCY), bounds, settings)
     search.look(simulate_from(system, FREQUENCY, np.linspace(*bounds, 5), np.zeros((5, 2)), COARSE.settling))
     assert not search.bands.bands
-    search.look(search.further[0].only(slice(0)), band_origins([family]))
+    search.look(search.given[0].only(slice(0)), band_origins([family]))
     inside = np.array([any(value in band for band in search.bands.bands) for value in (3.8035, 3.809)])
     assert inside.tolist() == [False, True]
     states = np.random.default_rng(2).uniform(-4.0, 4.0, (40, 2))

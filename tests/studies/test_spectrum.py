@@ -168,7 +168,8 @@ def test_progress_grows_to_one_and_says_what_is_done():
     assert (np.diff(shares) >= 0).all()
     assert shares[0] == 0.0
     assert shares[-1] == 1.0
-    assert {what.split(",")[0] for _, what in heard} == {"searching", "following", "looking for chaos", "confirming", "done"}
+    said = {what.split(",")[0] for _, what in heard} - {"following"}  # said only if branches take longer than what is beside them
+    assert said == {"searching", "looking for chaos", "estimating what is missing", "confirming", "done"}
 
 
 def test_where_everything_rests_there_is_no_branch():

@@ -257,7 +257,7 @@ def follow_segments_with(where, settings, env_of, model_of, arrays, spans, sides
     return spans.shape[0]
 
 
-@cached_jit(SEGMENTS)
+@cached_jit(SEGMENTS, nogil=True)
 def follow_segments(where, settings, env, model, spans, sides, states, ends, columns, extremes):
     """Follow all segments; returns how many could be followed.
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 from bisect import bisect_left, insort
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -15,14 +15,16 @@ from saltus.checks import check_count
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import checked_by
 from saltus.studies.checks import check_diagram
-from saltus.studies.diagram.bands import Bands, Tried, bands_of
-from saltus.studies.diagram.chaos_settings import SETTINGS, ChaosSettings
+from saltus.studies.diagram.bands import Bands
 from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.effort import EFFORTS, read_effort
+from saltus.studies.diagram.searched_range import Begun, Question, SearchedRange
 from saltus.studies.diagram.searched_value import SearchedValue
 from saltus.studies.diagram.simulated import SimulatedMotions, starts_at
 from saltus.systems import System
 from saltus.window import Box, check_window
+
+SLOWER = 0.8  # The share of the rest that is taken as still to be done after each round, as their number is not known before.
 
 
 class BandOrigin(NamedTuple):
@@ -115,136 +117,73 @@ def chaotic_bands(
 
 
 @dataclass
-class BandSearch:
-    """The search for bands of chaos between two values of a parameter; it remembers all motions that it was given or has begun.
+class BandSearch(SearchedRange):
+    """The search for bands of chaos between two values of a parameter."""
 
-    Long computations are done by `work`.
-    """
-
-    work: DiagramWork
-    bounds: tuple[float, float]
-    settings: ChaosSettings = SETTINGS
     special: list[BandOrigin] = field(default_factory=list)  # by value
-    places: list[SearchedValue] = field(default_factory=list)  # by value
-    further: list[SimulatedMotions] = field(default_factory=list)
     # Pairs of neighbouring values: motions were begun at the second one from those at the first one.
     carried: set[tuple[float, float]] = field(default_factory=set)
 
-    def look(self, begun: SimulatedMotions, special: Iterable[BandOrigin] = (), progress: Progress = silent) -> SimulatedMotions:
-        """Look for chaos from these new motions and beside these special points; returns the further motions that were begun."""
-        known, fresh = len(self.further), list[BandOrigin]()
-        for origin in special:
-            if not self._is_known(origin):
-                fresh.append(origin)
-                insort(self.special, origin, key=lambda other: other.value)
-        self.take(begun)
-        self.refine()
-        progress(0.4, "looking for chaos")
-        self.beside_special_points(fresh)
-        self.refine()
-        progress(0.6, "looking for chaos")
-        self.confirm()
-        progress(1.0, "looking for chaos")
-        further = self.further[known + 1 :]
-        return further[0].joined(*further[1:]) if further else begun.only(slice(0))
+    def look(self, motions: SimulatedMotions, special: Iterable[BandOrigin] = (), progress: Progress = silent) -> None:
+        """Look for chaos from these new motions and beside these special points: `locate` and `confirm`."""
+        self.locate(motions, special, part_of(progress, 0.0, 0.5))
+        self.confirm(part_of(progress, 0.5, 1.0))
 
-    def _is_known(self, origin: BandOrigin) -> bool:
-        """Whether a special point is known already: one at which a branch is born is found on both branches."""
-        near, same = self.settings.same * self.span, self.settings.same
-        ends = (bisect_left(self.special, origin.value + side, key=lambda other: other.value) for side in (-near, near))
-        return any(np.allclose(origin.state, other.state, rtol=0.0, atol=same) for other in self.special[slice(*ends)])
+    def begin(self, motions: SimulatedMotions, progress: Progress = silent) -> None:
+        """The part of `locate` for which branches need not be known: judge motions, and halve intervals between chaos."""
+        self.given.append(motions)
+        self.take(motions)
+        self.refine(progress, inside=True)
 
-    @property
-    def bands(self) -> Bands:
-        """The bands that have been found."""
-        tried, motions = self.tried(), self.further[0].joined(*self.further[1:])
-        return Bands(self.work.system, self.work.path, bands_of(tried), tried, motions)
+    def locate(self, motions: SimulatedMotions, special: Iterable[BandOrigin] = (), progress: Progress = silent) -> None:
+        """Locate the edges of bands and of windows, from these new motions and beside these special points."""
+        self.given.append(motions)
+        self.take(motions)
+        self.refine(part_of(progress, 0.0, 0.6))
+        self.beside_special_points(special)
+        self.refine(part_of(progress, 0.6, 1.0))
 
-    @property
-    def span(self) -> float:
-        """The width of the range."""
-        return self.bounds[1] - self.bounds[0]
-
-    def place(self, value: float) -> SearchedValue:
-        """The entry of a value, a new one if the value was not tried before."""
-        at = bisect_left(self.places, SearchedValue(value))
-        if at == len(self.places) or self.places[at].value != value:
-            insort(self.places, SearchedValue(value, chaos=np.empty((0, self.work.system.dimension))))
-        return self.places[at]
-
-    def follow(self, values: Sequence[float], starts: Sequence[np.ndarray], care: int = 0) -> None:
-        """Follow motions from states (n, d), given for each value, and judge those that do not settle."""
-        column = np.repeat(np.asarray(values, dtype=float), [len(states) for states in starts])
-        if len(column):
-            states = np.concatenate([some for some in starts if len(some)])
-            self.take(self.work.simulate(column, states, self.settings.settling), care)
-
-    def take(self, motions: SimulatedMotions, care: int = 0) -> None:
-        """Add motions to what is known, and judge those that have not settled."""
-        self._settle(motions)
-        for value in np.unique(motions.value):
-            self.place(float(value))
-        loose = motions.only(motions.unsettled)
-        values, row = np.unique(loose.value, return_inverse=True)
-        if not values.size:
-            return
-        most, last = int(np.bincount(row).max()), loose.states[:, -self.settings.states :]
-        states = np.full((len(values), most, *last.shape[1:]), np.nan)
-        for i in range(len(values)):
-            states[i, : np.count_nonzero(row == i)] = last[row == i]
-        self._judge(values, states.reshape(len(values), -1, states.shape[-1]), care)
-
-    def _judge(self, values: np.ndarray, states: np.ndarray, care: int, earlier: Earlier | None = None) -> None:
-        """Judge the motions that have not settled, of which states (n, m, d) are given, one row for each value.
-
-        Motions on which companions have settled are then simulated too, and added to what is known.
-        """
-        judged = self.work.judge(values, states, self.settings.judgements[care], earlier)
-        for row, value in enumerate(values):
-            self.place(float(value)).judge(judged, row, care)
-        found = judged.settled.few(self.settings.neighbours // 2, len(judged.settled.period))
-        if len(found.question):
-            column = values[found.question]
-            self._settle(self.work.simulate(column, found.state, self.settings.settling))
-
-    def _settle(self, motions: SimulatedMotions) -> None:
-        self.further.append(motions)
-        for i in np.flatnonzero(motions.periodic):
-            impacts = 0 if 0.0 < motions.slowest[i] < self.settings.dying else int(motions.impact_count[i])
-            facts = int(motions.period[i]), impacts, float(motions.amplitude[i])
-            self.place(float(motions.value[i])).settle(*facts, motions.last[i])
-
-    def beside_special_points(self, special: Sequence[BandOrigin]) -> None:
-        """Begin motions from the orbits of special points, at values beside them, but not within chaos that is known."""
+    def beside_special_points(self, special: Iterable[BandOrigin], progress: Progress = silent) -> None:
+        """Begin motions from the orbits of special points that were not known, at values beside them, but not within chaos that
+        is known."""
+        progress(0.0, "looking for chaos, beside special points")
         chosen: list[BandOrigin] = []
-        for origin in sorted(special, key=lambda origin: origin.value):
+        for origin in sorted(filter(self._note, special), key=lambda origin: origin.value):
             if not chosen or origin.value - chosen[-1].value >= self.settings.spacing * self.span:
                 chosen.append(origin)
         outside = [origin for origin in chosen if not self._is_within_chaos(origin.value)]
         values = [(origin.value + share * self.span, origin.state) for origin in outside for share in self.settings.beside]
-        inside = [(value, state) for value, state in values if self.bounds[0] <= value <= self.bounds[1]]
-        self.follow([value for value, _ in inside], [np.array([state]) for _, state in inside])
+        self.follow(Begun(value, np.array([state])) for value, state in values if self.bounds[0] <= value <= self.bounds[1])
+
+    def _note(self, origin: BandOrigin) -> bool:
+        """Note a special point, and return whether it is new: one at which a branch is born is found on both branches."""
+        near, same = self.settings.same * self.span, self.settings.same
+        ends = (bisect_left(self.special, origin.value + side, key=lambda other: other.value) for side in (-near, near))
+        if any(np.allclose(origin.state, other.state, rtol=0.0, atol=same) for other in self.special[slice(*ends)]):
+            return False
+        insort(self.special, origin, key=lambda other: other.value)
+        return True
 
     def _is_within_chaos(self, value: float) -> bool:
         """Whether there is chaos at both of the tried values next to this one."""
         at = bisect_left(self.places, SearchedValue(value))
         return 0 < at < len(self.places) and all(place.chaotic for place in self.places[at - 1 : at + 1])
 
-    def refine(self) -> None:
-        """Halve intervals and carry chaos to neighbouring values, until neither shows anything new.
+    def refine(self, progress: Progress = silent, inside: bool = False) -> None:
+        """Halve intervals and carry chaos to neighbouring values, until neither shows anything new; or, if asked, only halve
+        intervals between two values with chaos.
 
         All motions of a round are simulated together, as a few motions take nearly as long as many.
         """
-        while True:
-            middles = [(a, b) for a, b in pairwise(self.places) if self._is_of_interest(a, b)]
-            carried = self._to_carry()
+        for number in itertools.count():
+            progress(1.0 - SLOWER**number, f"looking for chaos, values: {len(self.places)}")
+            pairs = ((a, b) for a, b in itertools.pairwise(self.places) if not inside or (a.chaotic and b.chaotic))
+            middles = [(a, b) for a, b in pairs if self._is_of_interest(a, b)]
+            carried = [] if inside else self._to_carry()
             if not middles and not carried:
                 return
-            begun = {0: [(b.value, a.starts(self.settings.seeds, 0)) for a, b in carried]}
-            for a, b in middles:
-                begun.setdefault(self._care_between(a, b), []).append(self._begin_between(a, b))
-            for care, pairs in begun.items():
-                self.follow([value for value, _ in pairs], [states for _, states in pairs], care)
+            begun = [Begun(b.value, a.starts(self.settings.seeds, 0)) for a, b in carried]
+            self.follow(begun + [self._begin_between(a, b) for a, b in middles])
 
     def _to_carry(self) -> list[tuple[SearchedValue, SearchedValue]]:
         """Pairs of neighbouring values of which only the first one `goes_on`: its motions are to be continued at the second one.
@@ -255,7 +194,7 @@ class BandSearch:
             if any(place.chaotic for place in outermost):
                 self.place(bound)
         marked = [(place, place.goes_on) for place in self.places]
-        pairs = [(a, b) if on else (b, a) for (a, on), (b, other) in pairwise(marked) if on != other]
+        pairs = [(a, b) if on else (b, a) for (a, on), (b, other) in itertools.pairwise(marked) if on != other]
         fresh = [(a, b) for a, b in pairs if (a.value, b.value) not in self.carried]
         self.carried.update((a.value, b.value) for a, b in fresh)
         return fresh
@@ -274,8 +213,8 @@ class BandSearch:
         special = inside < len(self.special) and self.special[inside].value <= b.value
         return special or a.kinds != b.kinds or bool(len(a.chaos) + len(b.chaos))
 
-    def _begin_between(self, a: SearchedValue, b: SearchedValue) -> tuple[float, np.ndarray]:
-        """The middle of an interval, and the states from which motions begin there: those of the motions at both ends.
+    def _begin_between(self, a: SearchedValue, b: SearchedValue) -> Begun:
+        """The motions that begin in the middle of an interval, from the states of the motions at both ends.
 
         If all motions at both ends come to rest there are no such states; the middle then counts as tried all the same.
         """
@@ -283,7 +222,7 @@ class BandSearch:
         some = [states for states in (a.starts(*few), b.starts(*few)) if len(states)]
         self.place(middle)
         self.carried.update(((a.value, middle), (b.value, middle)))
-        return middle, np.concatenate(some) if some else np.empty((0, 0))
+        return Begun(middle, np.concatenate(some) if some else np.empty((0, 0)), self._care_between(a, b))
 
     def _care_between(self, a: SearchedValue, b: SearchedValue) -> int:
         """The care with which chaos between two values is judged: if there is an edge between them, the one that it needs."""
@@ -299,10 +238,11 @@ class BandSearch:
         judgements = self.settings.judgements
         return next((care for care, one in enumerate(judgements) if one.exposure >= 3.0 * life), len(judgements) - 1)
 
-    def confirm(self) -> None:
+    def confirm(self, progress: Progress = silent) -> None:
         """Judge doubtful chaos with more care; where it turns out to be a transient, find the new edges of the band."""
-        for _ in range(self.settings.confirmations):
-            failed = [place for care, places in self._doubtful().items() for place in self._confirm(places, care)]
+        for number in range(self.settings.confirmations):
+            progress(1.0 - SLOWER**number, "looking for chaos, confirming it")
+            failed = self._confirm(self._doubtful())
             if not failed:
                 return
             self._confirm_near(failed)
@@ -336,22 +276,29 @@ class BandSearch:
                 chaotic = [place for place in self.places if place.chaotic]
                 at = [bisect_left(chaotic, SearchedValue(value)) for value in beside]
                 near = {place.value: place for i in at for place in chaotic[max(0, i - reach) : i + reach]}
-                beside, reach = [place.value for place in self._confirm(near.values(), care)], 2 * reach
+                beside, reach = [place.value for place in self._confirm({care: list(near.values())})], 2 * reach
 
     def _edges(self) -> list[tuple[SearchedValue, SearchedValue]]:
         """Neighbours of which the first is chaotic and the second is not."""
-        pairs = [pair for a, b in pairwise(self.places) for pair in ((a, b), (b, a))]
+        pairs = [pair for a, b in itertools.pairwise(self.places) for pair in ((a, b), (b, a))]
         return [(a, b) for a, b in pairs if a.chaotic and not b.chaotic]
 
-    def _confirm(self, places: Iterable[SearchedValue], care: int) -> list[SearchedValue]:
-        """Judge chaos with this care where that has not been done; returns the values at which there is none after all."""
-        care = min(care, len(self.settings.judgements) - 1)
-        doubtful = list({place.value: place for place in places if place.chaotic and place.care < care}.values())
-        for size in {len(place.chaos) for place in doubtful}:
-            alike = [place for place in doubtful if len(place.chaos) == size]
+    def _confirm(self, doubtful: Mapping[int, Sequence[SearchedValue]]) -> list[SearchedValue]:
+        """Judge chaos with these cares where that has not been done; returns the values at which there is none after all."""
+        wanted: dict[float, tuple[int, SearchedValue]] = {}
+        for care in sorted(doubtful):  # of several cares the highest counts
+            wanted |= {place.value: (min(care, len(self.settings.judgements) - 1), place) for place in doubtful[care]}
+        asked: dict[tuple[int, int], list[SearchedValue]] = {}
+        for care, place in wanted.values():
+            if place.chaotic and place.care < care:
+                asked.setdefault((care, len(place.chaos)), []).append(place)
+        questions = []
+        for (care, _), alike in asked.items():
             known = Earlier(*np.array([(place.exponent, place.error, place.quiet) for place in alike]).T)
-            self._judge(np.array([place.value for place in alike]), np.stack([place.chaos for place in alike]), care, known)
-        return [place for place in doubtful if not place.chaotic]
+            states = np.stack([place.chaos for place in alike])
+            questions.append(Question(np.array([place.value for place in alike]), states, care, known))
+        self._judge(questions)
+        return [place for alike in asked.values() for place in alike if not place.chaotic]
 
     def _runs(self) -> list[list[SearchedValue]]:
         """The runs of successive values with chaos."""
@@ -375,19 +322,3 @@ class BandSearch:
             for kind in place.kinds:
                 extents.setdefault(kind, []).append(place)
         return [some for some in extents.values() if some[-1].value - some[0].value <= self.settings.every * self.span]
-
-    def tried(self) -> Tried:
-        """What became of motions at all values."""
-        most = max(judgement.companions for judgement in self.settings.judgements)
-        states = np.full((len(self.places), most, self.work.system.dimension), np.nan)
-        for row, place in enumerate(self.places):
-            states[row, : len(place.chaos)] = place.chaos
-        return Tried(
-            values=np.array([place.value for place in self.places]),
-            verdict=np.array([place.verdict for place in self.places]),
-            exponent=np.array([place.exponent for place in self.places]),
-            error=np.array([place.error for place in self.places]),
-            life=np.array([place.life for place in self.places]),
-            period=np.array([place.longest for place in self.places]),
-            states=states,
-        )

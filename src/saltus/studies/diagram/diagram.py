@@ -12,7 +12,7 @@ import numpy as np
 from saltus.checks import as_numbers, check_bounds, check_count, check_step
 from saltus.errors import ParameterError
 from saltus.orbits import STEP
-from saltus.progress import Progress, part_of, silent
+from saltus.progress import Progress, growing, part_of, silent
 from saltus.public_functions import checked_by
 from saltus.studies.checks import check_diagram
 from saltus.studies.diagram.attractors_found import LONG
@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 class WorkShares:
     """The share of the whole work that is done once each of its parts is."""
 
-    search: float = 0.2
-    branches: float = 0.6
-    bands: float = 0.9
+    simulation: float = 0.05
+    search: float = 0.7
+    estimate: float = 0.9
 
 
 SHARES = WorkShares()
@@ -149,6 +149,7 @@ def bifurcation_diagram(
     tried = EFFORTS[read_effort(effort)]
     tried = replace(tried, starts=tried.starts if starts is None else starts, samples=tried.samples if values is None else 1)
     grid, area = _values((low, high), values, tried.values), check_window(window, system)
+    progress = growing(progress)
     progress(0.0, "searching")
     plan, middle = diagram_plan(system, path, (low, high), area, seed), system.with_({path: 0.5 * (low + high)})
     with diagram_work(middle, path, plan, None if store is None else Path(store), workers, scheduler) as work:
@@ -161,18 +162,11 @@ def bifurcation_diagram(
 
 
 def _search(search: DiagramSearch, repelling: int, bands: bool, follow: bool, progress: Progress) -> None:
-    """Simulate; follow the orbits that this shows, the repelling ones, the families born on their branches, the orbits that
-    motions from neighbouring values add, and those in windows of chaos. Then see what random motions end on, and `follow` it."""
-    search.simulate(part_of(progress, 0.0, SHARES.search, "searching"))
-    following = part_of(progress, SHARES.search, SHARES.branches)
-    search.follow(following)
-    search.repel(repelling)
-    search.branches.grow(following)
-    search.carry_on(following)
-    if bands:
-        search.look_for_chaos(part_of(progress, SHARES.branches, SHARES.bands, "looking for chaos"))
-    search.estimate(follow)
-    progress(SHARES.bands, "confirming")
+    """Simulate; follow the orbits that this shows, and look for chaos; see what random motions end on, and `follow` it."""
+    search.simulate(part_of(progress, 0.0, SHARES.simulation, "searching"))
+    search.find(repelling, bands, part_of(progress, SHARES.simulation, SHARES.search))
+    search.estimate(follow, part_of(progress, SHARES.search, SHARES.estimate))
+    progress(SHARES.estimate, "confirming")
 
 
 @checked_by(bifurcation_diagram.check)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
-from saltus.attractors import share_interval
 from saltus.flow import motions_from, stroboscopic
 from saltus.orbits import PeriodicOrbit, keeps_symmetry, orbits_near_returns, solved_near, within_window
-from saltus.progress import Progress, silent
+from saltus.progress import Progress, part_of, silent
 from saltus.studies.diagram.attractors_found import LONG, AttractorsFound, Place
 from saltus.studies.diagram.band_edges import band_origins
 from saltus.studies.diagram.bands import Bands
@@ -19,7 +19,10 @@ from saltus.studies.diagram.branch_set import BranchSet
 from saltus.studies.diagram.chaos_search import BandSearch
 from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.effort import EffortSettings
+from saltus.studies.diagram.missed_share import MissedShare
 from saltus.studies.diagram.placement import PlacedBranch, placed, stable_motions
+from saltus.studies.diagram.side_by_side import side_by_side
+from saltus.studies.diagram.simulated import SETTINGS as SIMULATION
 from saltus.studies.diagram.simulated import SimulatedMotions, starts_at
 from saltus.systems import System
 from saltus.window import Window
@@ -42,31 +45,6 @@ class DiagramSearchSettings:
 SETTINGS = DiagramSearchSettings()
 
 
-@dataclass(frozen=True)
-class MissedShare:
-    """The share of states that end on something which is not in the diagram, estimated by a sample of them."""
-
-    missed: int = 0  # motions of the sample that end on such a thing
-    sample: int = 0
-    samples: int = 0  # how many samples were tried; this is the last one
-    ended: int = 0  # motions of the sample that a limit of the model ends, so that it is not known where they would have gone
-
-    @property
-    def share(self) -> float:
-        """The estimate; nan without a sample."""
-        return self.missed / self.sample if self.sample else np.nan
-
-    @property
-    def ended_share(self) -> float:
-        """The share of the sample that a limit of the model ends; nan without a sample."""
-        return self.ended / self.sample if self.sample else np.nan
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """The 95 % interval of a binomial share (Wilson's)."""
-        return share_interval(self.missed, self.sample)
-
-
 @dataclass
 class DiagramSearch:
     """One search: what was simulated and followed so far."""
@@ -81,6 +59,8 @@ class DiagramSearch:
     max_period: int  # the longest period of orbits that are followed
     found: AttractorsFound = field(init=False)
     band_search: BandSearch | None = None
+    taken: int = 0  # how many of the ensembles that it has begun are among the motions found
+    drawn: SimulatedMotions = field(init=False)  # the last sample of random motions
     chaos: Bands | None = None
     missed: MissedShare = field(default_factory=MissedShare)
     prepared: set[int] = field(default_factory=set)  # rows of motions whose branches were computed at once with others
@@ -240,22 +220,54 @@ class DiagramSearch:
         values = np.array([value for value, _ in found], dtype=float)
         return values, np.array([state for _, state in found], dtype=float).reshape(-1, self.system.dimension)
 
-    def look_for_chaos(self, progress: Progress) -> None:
-        """Find the bands of chaos, and follow the orbits in the windows of periodic motion within them."""
-        motions = self.found.motions
-        kept = np.unique(motions.value, return_index=True)[1], self.found.rows, np.flatnonzero(motions.unsettled)
-        self.band_search = BandSearch(self.work, self.bounds, self.effort.chaos)
-        self._add_bands(motions.only(np.unique(np.concatenate(kept))), progress)  # each attractor once, and every value
+    def find(self, repelling: int, bands: bool, progress: Progress) -> None:
+        """Follow the orbits that the simulation shows, and look for chaos where motions have not settled.
 
-    def _add_bands(self, begun: SimulatedMotions, progress: Progress = silent) -> None:
-        """Look for bands of chaos from these motions, and beside the special points of branches that are new since the last
-        time."""
-        if self.band_search is not None:
-            self.found.add(self.band_search.look(begun, band_origins(self.branches.branches), progress))
-            self.chaos = self.band_search.bands
-            self.follow(silent)
+        While branches are followed, the search for chaos does what does not depend on them.
+        """
+        if not bands:
+            self.follow(progress)
+            self._follow_more(repelling, progress)
+            return
+        self.band_search, simulated = BandSearch(self.work, self.bounds, self.effort.chaos), self.found.motions
+        begin = partial(self.band_search.begin, _without_repetition(simulated))
+        self._beside(self.follow, begin, part_of(progress, 0.0, 0.3))
+        look = partial(self.band_search.beside_special_points, band_origins(self.branches.branches))
+        self._beside(partial(self._follow_more, repelling), look, part_of(progress, 0.3, 0.4))
+        later = _without_repetition(self.found.motions.only(slice(len(simulated), None)))
+        self._take_begun()
+        self.band_search.locate(later, band_origins(self.branches.branches), part_of(progress, 0.4, 0.7))
+        self._take_begun()
+        self._beside(self.follow, self.band_search.confirm, part_of(progress, 0.7, 1.0))
+        self._take_begun()
 
-    def estimate(self, follow: bool) -> None:
+    def _follow_more(self, repelling: int, progress: Progress) -> None:
+        """Follow repelling orbits, the families born on branches, and the orbits that motions from neighbouring values show."""
+        self.repel(repelling)
+        self.branches.grow(progress)
+        self.carry_on(progress)
+
+    def _beside(self, follow: Callable[[Progress], object], here: Callable[[Progress], object], progress: Progress) -> None:
+        """Follow branches, and do something else that neither needs nor changes them at the same time.
+
+        One is done after the other if other processes compute, or if results are kept.
+        """
+        if self.work.parts is None:
+            side_by_side(follow, here, progress)
+        else:
+            follow(progress)
+            here(progress)
+
+    def _take_begun(self) -> None:
+        """Add the motions that the search for chaos has begun since the last time, and take its bands."""
+        assert self.band_search is not None
+        new = self.band_search.begun[self.taken :]
+        self.taken += len(new)
+        if new:
+            self.found.add(new[0].joined(*new[1:]))
+        self.chaos = self.band_search.bands
+
+    def estimate(self, follow: bool, progress: Progress = silent) -> None:
         """Estimate which share of the states ends on something that the diagram does not have, by random motions.
 
         Motions that have not settled outside bands of chaos are given more time, as they are still on their way to an attractor.
@@ -263,30 +275,34 @@ class DiagramSearch:
         more than one sample, chaos is looked for where they do not settle. Then a new sample is counted.
         """
         for number in range(self.effort.samples):
-            motions = self._random_motions(number)
             first = len(self.found.motions)
-            self.found.add(motions)
+            self._beside(self.follow, partial(self._draw, number), progress)
+            self.found.add(self.drawn)
             self._place()
             unknown = self.found.place[self.found.attractor[first:]] != Place.ON_BRANCH
-            missed = (motions.periodic & unknown) | (motions.unsettled & ~self._in_bands(motions.value))
-            self.missed = MissedShare(int(missed.sum()), len(motions), number + 1, int(motions.ended.sum()))
+            loose = self.drawn.unsettled & ~self._in_bands(self.drawn.value)
+            missed = (self.drawn.periodic & unknown) | loose
+            self.missed = MissedShare(int(missed.sum()), len(missed), number + 1, int(self.drawn.ended.sum()))
             if not follow or not missed.any():
                 return
             self.found.reopen(np.arange(first, len(self.found.motions)))
-            self.follow(silent)
-            if self.effort.samples > 1:
-                self._add_bands(motions.only(motions.unsettled & ~self._in_bands(motions.value)))
+            if self.band_search is not None and self.effort.samples > 1:
+                motions, origins = _without_repetition(self.drawn.only(loose)), band_origins(self.branches.branches)
+                self._beside(self.follow, partial(self.band_search.look, motions, origins), progress)
+                self._take_begun()
+        self.follow(progress)
 
-    def _random_motions(self, number: int) -> SimulatedMotions:
-        """Motions from random states of the window at random values; each sample has its own seed."""
+    def _draw(self, number: int, progress: Progress) -> None:
+        """Draw a sample: motions from random states of the window at random values; each sample has its own seed."""
         rng = np.random.default_rng([self.seed, number, self.effort.sample])
         values = rng.uniform(*self.bounds, self.effort.sample)
         points = rng.uniform(-1.0, 1.0, (self.effort.sample, len(self.window)))
-        motions = self.simulated(values, within_window(self.system, points, self.window))
+        watch = part_of(progress, 0.0, 1.0, "estimating what is missing")
+        motions = self.simulated(values, within_window(self.system, points, self.window), watch)
         loose = np.flatnonzero(motions.unsettled & ~self._in_bands(values))
         if loose.size:
             motions.gone_on(loose, self.work.followed(values[loose], motions.last[loose], self.effort.lasting))
-        return motions
+        self.drawn = motions
 
     def _in_bands(self, values: np.ndarray) -> np.ndarray:
         """Which values lie in a band of chaos, (n,)."""
@@ -294,6 +310,13 @@ class DiagramSearch:
         for band in () if self.chaos is None else self.chaos.bands:
             inside |= (values >= band.low) & (values <= band.high)
         return inside
+
+
+def _without_repetition(motions: SimulatedMotions) -> SimulatedMotions:
+    """Each attractor once, every value, and the motions that have not settled."""
+    found = AttractorsFound(motions, SIMULATION.max_period)
+    kept = np.unique(motions.value, return_index=True)[1], found.rows, np.flatnonzero(motions.unsettled)
+    return motions.only(np.unique(np.concatenate(kept)))
 
 
 def _middle(run: np.ndarray) -> int:

@@ -11,6 +11,7 @@ import base64
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, field, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +31,7 @@ from saltus.orbits import (
 )
 from saltus.progress import Progress, silent
 from saltus.provenance import check_provenance, identity, provenance
+from saltus.studies.diagram.side_by_side import all_at_once
 from saltus.studies.diagram.simulated import SETTINGS, SimulatedMotions, followed, simulate_from
 from saltus.systems import System
 
@@ -136,6 +138,12 @@ class DiagramWork:
             for one, row in zip(inputs, np.stack([getattr(earlier, name) for name in EARLIER], axis=1).tolist(), strict=True):
                 one["earlier"] = row
         return _judged(np.array(self.parts.rows(self._kinds["judgements"], inputs)), settings.companions, self.system.dimension)
+
+    def judge_all(self, questions: Sequence[tuple[np.ndarray, np.ndarray, JudgementSettings, Earlier | None]]) -> list[Judged]:
+        """`judge` several times, if nothing is kept and no other process computes all at once."""
+        if self.parts is not None:
+            return [self.judge(*question) for question in questions]
+        return all_at_once([partial(self.judge, *question) for question in questions])
 
     def follow(self, requests: Sequence[Request]) -> list[list[Branch]]:
         """The branches of each request; those that the store lacks are computed at the same time."""
