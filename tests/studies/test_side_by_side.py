@@ -2,14 +2,20 @@
 
 import threading
 from concurrent.futures import CancelledError
+from dataclasses import replace
 
+import numpy as np
 import pytest
 import xarray as xr
 from shared_systems import forced
 
 import saltus
+from saltus.attractors import Unsettled
 from saltus.progress import growing, silent
 from saltus.studies.diagram import side_by_side as module
+from saltus.studies.diagram.diagram_work import DiagramWork
+from saltus.studies.diagram.effort import EFFORTS, Effort
+from saltus.studies.diagram.searched_range import Begun, SearchedRange
 from saltus.studies.diagram.side_by_side import all_at_once, side_by_side
 
 AMPLITUDE = "load.horizontal.amplitude"
@@ -24,15 +30,28 @@ def cores(monkeypatch):
     return use
 
 
-def test_a_diagram_does_not_depend_on_whether_its_parts_run_at_the_same_time(cores):
-    """The first chaos of Fig. 11, behind a cascade of doublings, on one core and on two."""
+def test_a_diagram_does_not_depend_on_whether_its_parts_run_at_the_same_time(cores, monkeypatch):
+    """The first chaos of Fig. 11, behind a cascade of doublings, with two random samples."""
+    monkeypatch.setitem(EFFORTS, Effort.QUICK, replace(EFFORTS[Effort.QUICK], samples=2))
     diagrams = []
     for count in (1, 2):
         cores(count)
-        diagrams.append(saltus.bifurcation_diagram(forced(1.0), AMPLITUDE, (1.74, 1.78), effort="quick"))
+        diagrams.append(saltus.bifurcation_diagram(forced(1.0), AMPLITUDE, (1.75, 1.765), effort="quick", starts=4))
     assert diagrams[0]["bands"].sizes["band"] > 0
     for path in diagrams[0].groups:
         xr.testing.assert_identical(diagrams[0][path].to_dataset(), diagrams[1][path].to_dataset())
+
+
+def test_values_that_are_judged_with_different_care_at_the_same_time_have_the_same_verdicts(cores):
+    states, found = np.random.default_rng(3).uniform(-0.5, 0.5, (4, 2)), []
+    for count in (1, 2):
+        cores(count)
+        search = SearchedRange(DiagramWork(forced(1.0), AMPLITUDE), (1.74, 1.77))
+        search.follow([Begun(1.755, states, 0), Begun(1.76, states, 1), Begun(1.765, states, 0)])
+        found.append(search.tried())
+    assert (found[0].verdict == Unsettled.CHAOTIC).sum() >= 2
+    for one, other in zip(*(vars(tried).values() for tried in found), strict=True):
+        assert np.array_equal(one, other, equal_nan=True)
 
 
 def test_both_parts_run_at_the_same_time(cores):
@@ -84,21 +103,52 @@ def test_an_interrupt_ends_the_other_part_at_its_next_report(cores):
     assert ended == [True]
 
 
-def test_an_error_beside_is_raised_after_the_other_part(cores):
-    done = []
+def test_an_error_beside_ends_the_other_part_at_its_next_report(cores):
+    failed = threading.Event()
 
     def fail(progress):
+        failed.set()
         raise saltus.ParameterError("no orbit", "load")
 
+    def here(progress):
+        failed.wait(30.0)
+        while True:
+            progress(0.0, "here")
+
     with pytest.raises(saltus.ParameterError, match="no orbit"):
-        side_by_side(fail, lambda progress: done.append(True), silent)
-    assert done == [True]
+        side_by_side(fail, here, silent)
 
 
 @pytest.mark.parametrize("count", [1, 2])
 def test_all_results_come_in_the_order_of_the_computations(cores, count):
     cores(count)
-    assert all_at_once([lambda number=number: number**2 for number in range(5)]) == [0, 1, 4, 9, 16]
+    assert all_at_once([lambda progress, number=number: number**2 for number in range(5)]) == [0, 1, 4, 9, 16]
+
+
+def test_an_error_of_one_computation_ends_the_others_at_their_next_report(cores):
+    def fail(progress):
+        raise saltus.ParameterError("no orbit", "load")
+
+    def endless(progress):
+        while True:
+            progress(0.0, "")
+
+    with pytest.raises(saltus.ParameterError, match="no orbit"):
+        all_at_once([endless, fail, endless])
+
+
+@pytest.mark.parametrize("when", ["following", "looking for chaos, values", "looking for chaos, confirming", "estimating"])
+def test_an_interrupted_diagram_ends_at_once(cores, when):
+    """The threads are gone when the interrupt arrives where the diagram was asked for."""
+
+    def interrupt(fraction, what):
+        if what.startswith(when):
+            raise KeyboardInterrupt
+
+    begun = set(threading.enumerate())
+    with pytest.raises(KeyboardInterrupt):
+        saltus.bifurcation_diagram(forced(1.0), AMPLITUDE, (1.74, 1.77), effort="quick", starts=4, progress=interrupt)
+    assert {thread for thread in threading.enumerate() if thread not in begun and not thread.name.startswith("saltus")} == set()
 
 
 def test_a_growing_progress_never_falls():

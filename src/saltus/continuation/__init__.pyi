@@ -1,4 +1,4 @@
-from .continuation_loop import Bounds, Continuation, both_ways
+from .continuation_loop import Bounds, Continuation, Watch, both_ways
 from .corrector import NEWTON, Corrected, Evaluation, newton
 from .course import Course
 from .curve import Curve, Point
@@ -35,6 +35,7 @@ __all__ = [
     "Point",
     "StepSettings",
     "TestFunction",
+    "Watch",
     "Zero",
     "between",
     "bisected",

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from saltus.checks import check_along, check_bounds, check_path, check_step
-from saltus.continuation import STEPS, Continuation, End, both_ways
+from saltus.continuation import STEPS, Continuation, End, Watch, both_ways
 from saltus.errors import ParameterError, shown
 from saltus.orbits.branch import START, Branch
 from saltus.orbits.branch_events import BranchEvents
@@ -110,10 +110,12 @@ def follow_from(
     functions: dict[str, UserFunction] | None = None,
     step: float = STEP,
     until: SpecialKind | None = None,
+    progress: Progress = silent,
 ) -> Branch:
     """The branch that begins at a special point of another one, in the direction of its tangent."""
-    path = first.orbit.problem.paths[0]
-    run = Continuation({path: bounds}, BranchEvents(functions or {}, until), replace(STEPS, longest=step))
+    path, steps = first.orbit.problem.paths[0], replace(STEPS, longest=step)
+    within = {path: bounds}
+    run = Continuation(within, BranchEvents(functions or {}, until), steps, Watch(progress, within, steps.most_points))
     run.follow(first, born=True)
     return Branch(**vars(run.course(origin)), path=path, origin=origin)
 

@@ -16,6 +16,7 @@ from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.problem import Problem
 from saltus.orbits.special_point import OrbitEnd, SpecialKind, SpecialPoint, UserFunction
 from saltus.orbits.symmetry import full_period
+from saltus.progress import Progress, silent
 from saltus.result import Result, result_dataset
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ def switch_branch(
     functions: dict[str, UserFunction] | None = None,
     step: float = STEP,
     both: bool = True,
+    progress: Progress = silent,
 ) -> tuple[Branch, ...]:
     """The branches that begin at a special point of another branch.
 
@@ -45,6 +47,8 @@ def switch_branch(
         As for `continue_orbit`.
     both
         Whether both of two branches of mirror images are followed, whose orbits differ in phase and sign only.
+    progress
+        Called at every point with the fraction of the range that is done.
 
     Raises
     ------
@@ -72,7 +76,8 @@ def switch_branch(
         starts = _unsymmetric(special.point)[: 2 if both else 1]
     else:
         starts = _crossing_branch(special.point)
-    return tuple(follow_from(start, bounds, _origin(special), functions, step) for start in starts if start is not None)
+    origin, begun = _origin(special), [start for start in starts if start is not None]
+    return tuple(follow_from(start, bounds, origin, functions, step, progress=progress) for start in begun)
 
 
 def _origin(special: SpecialPoint) -> End:

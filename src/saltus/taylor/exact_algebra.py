@@ -7,6 +7,7 @@ normal form of sin(x)^2 + cos(x)^2 is not 1. Equality is thus proved; different 
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Hashable, Mapping
 from fractions import Fraction
@@ -24,6 +25,7 @@ MOST_TERMS = 1000  # A longer polynomial is not written out: models have a few d
 ODD, EVEN = ("sin", "sinh", "tanh", "atan"), ("cos", "cosh")
 
 _atoms: dict[Hashable, int] = {}
+_numbers = itertools.count()  # which gives no two threads the same number
 
 
 class NoNormalForm(Exception):
@@ -72,7 +74,7 @@ def _form(node: Expr, args: list[Form]) -> Form:
 
 
 def _atom(key: Hashable, factor: Fraction = Fraction(1)) -> Form:
-    return {((_atoms.setdefault(key, len(_atoms)), 1),): factor}
+    return {((_atoms.setdefault(key, next(_numbers)), 1),): factor}
 
 
 def _sum(a: Form, b: Form, sign: int) -> Form:

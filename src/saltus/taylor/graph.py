@@ -49,7 +49,7 @@ class Expr:
         if node is None:
             node = super().__new__(cls)
             node.op, node.args, node.value, node.degree = op, args, value, _degree(op, args)
-            cls._shared[key] = node
+            node = cls._shared.setdefault(key, node)  # another thread may have made it in the meantime
         return node
 
     def __add__(self, other: Any) -> Expr:

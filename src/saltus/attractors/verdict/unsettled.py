@@ -45,7 +45,7 @@ class JudgementSettings:
     # Number of companions: motions from the states of a question, which stand for all motions there.
     companions: int = 16
     first_periods: int = 250  # The first round in forcing periods; most transients end in it, and need no exponents.
-    round_periods: int = 1500  # The length of each further round. After a round survivors replace the companions that settled.
+    round_periods: int = 1625  # The length of each further round. After a round survivors replace the companions that settled.
     rounds: int = 12  # The largest number of further rounds.
     # Forcing periods, added up over companions, in which none may settle. If none has settled within E, transients of a mean life
     # of E / 3 or less are excluded with a probability of 95 %, as the number that settle within E is Poisson distributed.

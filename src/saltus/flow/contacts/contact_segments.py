@@ -296,7 +296,7 @@ def follow_with(
     return plan.shape[0]
 
 
-@cached_jit(CONTACT_SEGMENTS)
+@cached_jit(CONTACT_SEGMENTS, nogil=True)
 def follow_contact_segments(where, settings, env, model, contacts, plan, times, first, ends, columns, maps, extremes):
     """Follow segments one after the other, each from the state after the event before it; returns how many were followed.
 

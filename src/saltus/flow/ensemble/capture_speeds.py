@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Mapping
 from typing import Any
 
@@ -74,18 +75,20 @@ def _remembered(system: System, columns: Mapping[str, np.ndarray]) -> np.ndarray
         return proved_speeds(system, columns)
     sets, place = distinct_rows(list(varied.values()))
     single = {path: float(values) for path, values in columns.items() if not values.ndim}
-    if len(_proved) >= MOST_SYSTEMS:
-        _proved.clear()
-    known = _proved.setdefault((system.to_json(), *varied, *single.items()), {})
     rows = [row.tobytes() for row in sets]
-    new = [i for i, row in enumerate(rows) if row not in known]
-    if new:
-        if len(known) + len(new) > MOST_PROVED:
-            known.clear()
-            new = list(range(len(rows)))
-        distinct = dict(zip(varied, sets[new].T, strict=True))
-        known.update(zip((rows[i] for i in new), proved_speeds(system, {**columns, **distinct}).tolist(), strict=True))
-    return np.asarray(np.array([known[row] for row in rows])[place])
+    with _proving:
+        if len(_proved) >= MOST_SYSTEMS:
+            _proved.clear()
+        known = _proved.setdefault((system.to_json(), *varied, *single.items()), {})
+        new = [i for i, row in enumerate(rows) if row not in known]
+        if new:
+            if len(known) + len(new) > MOST_PROVED:
+                known.clear()
+                new = list(range(len(rows)))
+            distinct = dict(zip(varied, sets[new].T, strict=True))
+            known.update(zip((rows[i] for i in new), proved_speeds(system, {**columns, **distinct}).tolist(), strict=True))
+        return np.asarray(np.array([known[row] for row in rows])[place])
 
 
+_proving = threading.Lock()  # Studies follow several ensembles at the same time.
 _proved: dict[tuple[Any, ...], dict[bytes, float]] = {}

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from saltus.orbits import Branch, PeriodicOrbit, SpecialKind, SpecialPoint
-from saltus.progress import Progress
+from saltus.progress import Progress, part_of, silent
 from saltus.studies.diagram.diagram_work import DiagramWork, Request
 from saltus.studies.diagram.placement import PlacedBranch
 
@@ -52,15 +52,15 @@ class BranchSet:
     compared: dict[int, int] = field(default_factory=dict)  # with how many branches each partial branch was compared
     left: int = 0  # special points at which a family is born that is not followed
 
-    def follow(self, orbit: PeriodicOrbit, while_stable: bool = False) -> None:
+    def follow(self, orbit: PeriodicOrbit, while_stable: bool = False, progress: Progress = silent) -> None:
         """Follow an orbit unless it lies on a known branch: either only while it is stable, or all the way, and then also the
         parents' branches at whose special points its branch ends."""
         if while_stable and not self.knows(orbit):
-            self.placed.append(PlacedBranch(self._continued(orbit, while_stable=True)))
+            self.placed.append(PlacedBranch(self._continued(orbit, progress, while_stable=True)))
             self.partial.add(id(self.placed[-1]))
         waiting = [] if while_stable else [orbit]
         while waiting:
-            waiting += self._follow(waiting.pop(0))
+            waiting += self._follow(waiting.pop(0), progress)
 
     def prepare(self, orbits: Sequence[tuple[PeriodicOrbit, bool]]) -> None:
         """Compute the branches of orbits that lie on no known one at the same time; the second entry of each pair says whether
@@ -74,8 +74,7 @@ class BranchSet:
             if widest is None:
                 return
             self.grown.add(id(widest))
-            self._grow(widest)
-            progress(1.0, f"following, branches: {len(self.placed)}")
+            self._grow(widest, part_of(progress, 1.0, 1.0, f"following, branches: {len(self.placed)}"))
 
     @property
     def branches(self) -> list[Branch]:
@@ -101,24 +100,24 @@ class BranchSet:
                 self.parts.add(key)
         return key in self.parts
 
-    def _continued(self, orbit: PeriodicOrbit, while_stable: bool = False) -> Branch:
-        return self.work.follow([self.request(orbit, while_stable)])[0][0]
+    def _continued(self, orbit: PeriodicOrbit, progress: Progress, while_stable: bool = False) -> Branch:
+        return self.work.follow([self.request(orbit, while_stable)], progress)[0][0]
 
     def request(self, start: PeriodicOrbit | SpecialPoint, while_stable: bool = False) -> Request:
         """The request for the branch of an orbit, or for the branches that are born at a special point."""
         period = _period_born(start) if isinstance(start, SpecialPoint) else start.period
         return Request(start, self._range(period), self.step, while_stable)
 
-    def _follow(self, orbit: PeriodicOrbit) -> list[PeriodicOrbit]:
+    def _follow(self, orbit: PeriodicOrbit, progress: Progress) -> list[PeriodicOrbit]:
         """Follow an orbit unless it lies on a known branch; returns an orbit of each parent's branch on which its branch ends."""
         if self.knows(orbit):
             return []
-        branch = self._continued(orbit)
+        branch = self._continued(orbit, progress)
         self.placed.append(PlacedBranch(branch))
         specials = filter(self._is_branching, branch.special) if self.switch else ()
         return [beside for special in specials if _is_parent(special, branch) for beside in _beside(special)]
 
-    def _grow(self, branch: Branch) -> None:
+    def _grow(self, branch: Branch, progress: Progress) -> None:
         """Follow the families that are born on a branch."""
         narrow = self._width(branch) < SETTINGS.narrow * (self.bounds[1] - self.bounds[0])
         own = [special for special in filter(self._is_branching, branch.special) if not _is_parent(special, branch)]
@@ -132,7 +131,7 @@ class BranchSet:
             if narrow or not visible[id(special)] or len(self.placed) >= self.most:
                 self.left += 1
             else:
-                self.placed += map(PlacedBranch, self._born_at(special))
+                self.placed += map(PlacedBranch, self._born_at(special, progress))
 
     def _width(self, branch: Branch) -> float:
         """The part of the range that a branch covers."""
@@ -149,9 +148,9 @@ class BranchSet:
         inside = self.bounds[0] <= special.parameter <= self.bounds[1]
         return inside and special.kind in BRANCHING and _period_born(special) <= self.max_period
 
-    def _born_at(self, special: SpecialPoint) -> list[Branch]:
+    def _born_at(self, special: SpecialPoint, progress: Progress) -> list[Branch]:
         """The branches that begin at a special point, without those that are known already."""
-        born = self.work.follow([self.request(special)])[0]
+        born = self.work.follow([self.request(special)], progress)[0]
         return [branch for branch in born if not self.knows(branch.points[len(branch.points) // 2].orbit)]
 
     def _is_followed(self, special: SpecialPoint) -> bool:

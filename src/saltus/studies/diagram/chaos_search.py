@@ -121,6 +121,7 @@ class BandSearch(SearchedRange):
     """The search for bands of chaos between two values of a parameter."""
 
     special: list[BandOrigin] = field(default_factory=list)  # by value
+    chosen: list[float] = field(default_factory=list)  # the values of special points beside which motions were begun
     # Pairs of neighbouring values: motions were begun at the second one from those at the first one.
     carried: set[tuple[float, float]] = field(default_factory=set)
 
@@ -128,6 +129,7 @@ class BandSearch(SearchedRange):
         """Look for chaos from these new motions and beside these special points: `locate` and `confirm`."""
         self.locate(motions, special, part_of(progress, 0.0, 0.5))
         self.confirm(part_of(progress, 0.5, 1.0))
+        progress(1.0, "looking for chaos")
 
     def begin(self, motions: SimulatedMotions, progress: Progress = silent) -> None:
         """The part of `locate` for which branches need not be known: judge motions, and halve intervals between chaos."""
@@ -147,13 +149,19 @@ class BandSearch(SearchedRange):
         """Begin motions from the orbits of special points that were not known, at values beside them, but not within chaos that
         is known."""
         progress(0.0, "looking for chaos, beside special points")
-        chosen: list[BandOrigin] = []
-        for origin in sorted(filter(self._note, special), key=lambda origin: origin.value):
-            if not chosen or origin.value - chosen[-1].value >= self.settings.spacing * self.span:
-                chosen.append(origin)
+        fresh = sorted(filter(self._note, special), key=lambda origin: origin.value)
+        chosen = [origin for origin in fresh if self._is_apart(origin.value)]
         outside = [origin for origin in chosen if not self._is_within_chaos(origin.value)]
         values = [(origin.value + share * self.span, origin.state) for origin in outside for share in self.settings.beside]
         self.follow(Begun(value, np.array([state])) for value, state in values if self.bounds[0] <= value <= self.bounds[1])
+
+    def _is_apart(self, value: float) -> bool:
+        """Whether no special point nearby was chosen before; then this one is."""
+        at, least = bisect_left(self.chosen, value), self.settings.spacing * self.span
+        apart = all(abs(value - other) >= least for other in self.chosen[max(0, at - 1) : at + 1])
+        if apart:
+            insort(self.chosen, value)
+        return apart
 
     def _note(self, origin: BandOrigin) -> bool:
         """Note a special point, and return whether it is new: one at which a branch is born is found on both branches."""

@@ -106,9 +106,10 @@ class DiagramSearch:
                         self.found.place[run] = Place.LEFT
                         continue
                     self._prepare(runs[number:])
-                    self.found.place[row] = self._follow(row, while_stable=narrow)
-                known = len(self.branches.placed)
-                progress(known / (known + len(rows)), f"following, branches: {known}")
+                    known = len(self.branches.placed)
+                    share = known / (known + len(rows))
+                    watch = part_of(progress, share, share, f"following, branches: {known}")
+                    self.found.place[row] = self._follow(row, narrow, watch)
 
     def _place(self) -> None:
         """Compare the attractors that lie on no branch so far with the branches that are new to them."""
@@ -158,18 +159,18 @@ class DiagramSearch:
         system = self.system.with_({self.path: float(motions.value[row])})
         return solved_near(system, self.path, motions.last[row], int(motions.period[row]))
 
-    def _follow(self, row: int, while_stable: bool) -> Place:
+    def _follow(self, row: int, while_stable: bool, progress: Progress) -> Place:
         """Follow a simulated motion; returns where it then stands."""
         orbit = self._orbit(row)
         if orbit is None:
             return Place.NO_ORBIT
         known = len(self.branches.placed)
-        self.branches.follow(orbit, while_stable and orbit.stable)
+        self.branches.follow(orbit, while_stable and orbit.stable, progress)
         if self._is_placed(row, self.branches.placed[known:]):
             return Place.ON_BRANCH
         return Place.ELSEWHERE if orbit.stable else Place.UNSTABLE
 
-    def repel(self, max_period: int) -> None:
+    def repel(self, max_period: int, progress: Progress) -> None:
         """Follow repelling orbits to which motions come near and near which they return, at some values of the grid.
 
         Their number is limited, as chaos contains any number of them.
@@ -177,7 +178,8 @@ class DiagramSearch:
         grid = self.grid[np.unique(np.linspace(0, len(self.grid) - 1, self.effort.repelling_values).astype(int))]
         begin = starts_at(self.system, grid, self.effort.starts, self.window, self.seed)
         columns = {self.path: np.repeat(grid, self.effort.starts)}
-        options = {"periods": SETTINGS.transient, "last": "all", "tol": 1e-10, "until": ("rest",)}
+        watch = part_of(progress, 1.0, 1.0, "following repelling orbits")
+        options = {"periods": SETTINGS.transient, "last": "all", "tol": 1e-10, "until": ("rest",), "progress": watch}
         d, motions = self.system.dimension, self.found.motions
         early = stroboscopic(self.system, motions_from(self.system, begin.reshape(-1, d), parameters=columns, **options))
         shape = (len(grid), self.effort.starts, -1, d)
@@ -189,21 +191,21 @@ class DiagramSearch:
         most = len(self.branches.placed) + self.effort.branches
         for orbit in sorted(orbits, key=lambda orbit: orbit.period):
             if len(self.branches.placed) < most:
-                self.branches.follow(orbit)
+                self.branches.follow(orbit, progress=watch)
             else:
                 self.branches.left += 1
 
     def carry_on(self, progress: Progress) -> None:
         """Start motions from those at neighbouring values and from the ends of stable parts of branches, until these show nothing
         new."""
-        since, ended = 0, 0
+        since, ended, watch = 0, 0, part_of(progress, 1.0, 1.0, "following motions from neighbouring values")
         for number in range(SETTINGS.rounds):
             known = stable_motions(self.branches.placed, self.grid, self.system.dimension)
             values, states = self.found.seeds(self.system, self.grid, known, since)
             more_values, more_states = self._beyond_ends(self.branches.placed[ended:] if number < self.effort.jumps else [])
             since, ended = len(self.found.motions), len(self.branches.placed)
             values, states = np.concatenate([values, more_values]), np.concatenate([states, more_states])
-            if not len(values) or not self.found.add(self.simulated(values, states)):
+            if not len(values) or not self.found.add(self.simulated(values, states, watch)):
                 return
             self.follow(progress)
 
@@ -221,36 +223,47 @@ class DiagramSearch:
         return values, np.array([state for _, state in found], dtype=float).reshape(-1, self.system.dimension)
 
     def find(self, repelling: int, bands: bool, progress: Progress) -> None:
-        """Follow the orbits that the simulation shows, and look for chaos where motions have not settled.
-
-        While branches are followed, the search for chaos does what does not depend on them.
-        """
-        if not bands:
+        """Follow the orbits that the simulation shows, and look for chaos where motions have not settled."""
+        more = partial(self._follow_more, repelling)
+        if bands:
+            self.band_search = BandSearch(self.work, self.bounds, self.effort.chaos)
+            self._look_for_chaos(self.found.motions, progress, more)
+        else:
             self.follow(progress)
-            self._follow_more(repelling, progress)
-            return
-        self.band_search, simulated = BandSearch(self.work, self.bounds, self.effort.chaos), self.found.motions
-        begin = partial(self.band_search.begin, _without_repetition(simulated))
+            more(progress)
+
+    def _look_for_chaos(
+        self, motions: SimulatedMotions, progress: Progress, more: Callable[[Progress], object] | None = None
+    ) -> None:
+        """Look for chaos from motions, while the orbits on which motions settle are followed.
+
+        What depends on branches comes when these are known: motions beside their special points, and the motions that `more`
+        follows from neighbouring values.
+        """
+        assert self.band_search is not None
+        search, known = self.band_search, len(self.found.motions)
+        begin = partial(search.begin, _without_repetition(motions))
         self._beside(self.follow, begin, part_of(progress, 0.0, 0.3))
-        look = partial(self.band_search.beside_special_points, band_origins(self.branches.branches))
-        self._beside(partial(self._follow_more, repelling), look, part_of(progress, 0.3, 0.4))
-        later = _without_repetition(self.found.motions.only(slice(len(simulated), None)))
+        if more is not None:
+            look = partial(search.beside_special_points, band_origins(self.branches.branches))
+            self._beside(more, look, part_of(progress, 0.3, 0.4))
+        later = _without_repetition(self.found.motions.only(slice(known, None)))  # without those that the search knows already
         self._take_begun()
-        self.band_search.locate(later, band_origins(self.branches.branches), part_of(progress, 0.4, 0.7))
+        search.locate(later, band_origins(self.branches.branches), part_of(progress, 0.4, 0.7))
         self._take_begun()
-        self._beside(self.follow, self.band_search.confirm, part_of(progress, 0.7, 1.0))
+        self._beside(self.follow, search.confirm, part_of(progress, 0.7, 1.0))
         self._take_begun()
 
     def _follow_more(self, repelling: int, progress: Progress) -> None:
         """Follow repelling orbits, the families born on branches, and the orbits that motions from neighbouring values show."""
-        self.repel(repelling)
+        self.repel(repelling, progress)
         self.branches.grow(progress)
         self.carry_on(progress)
 
     def _beside(self, follow: Callable[[Progress], object], here: Callable[[Progress], object], progress: Progress) -> None:
-        """Follow branches, and do something else that neither needs nor changes them at the same time.
+        """Do something else while branches are followed, which it neither needs nor changes.
 
-        One is done after the other if other processes compute, or if results are kept.
+        One comes after the other if other processes compute, or if results are kept.
         """
         if self.work.parts is None:
             side_by_side(follow, here, progress)
@@ -287,9 +300,7 @@ class DiagramSearch:
                 return
             self.found.reopen(np.arange(first, len(self.found.motions)))
             if self.band_search is not None and self.effort.samples > 1:
-                motions, origins = _without_repetition(self.drawn.only(loose)), band_origins(self.branches.branches)
-                self._beside(self.follow, partial(self.band_search.look, motions, origins), progress)
-                self._take_begun()
+                self._look_for_chaos(self.drawn.only(loose), progress)
         self.follow(progress)
 
     def _draw(self, number: int, progress: Progress) -> None:

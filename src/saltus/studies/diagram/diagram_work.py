@@ -71,11 +71,12 @@ class Request:
         numbers = {"bounds": list(self.bounds), "step": self.step, "while_stable": self.while_stable}
         return numbers | {"start": base64.b64encode(as_bytes(self.start)).decode()}
 
-    def branches(self, path: str) -> list[Branch]:
+    def branches(self, path: str, progress: Progress = silent) -> list[Branch]:
         """The branches."""
+        options: dict[str, Any] = {"step": self.step, "progress": progress}
         if isinstance(self.start, SpecialPoint):
-            return list(switch_branch(self.start, self.bounds, step=self.step, both=False))
-        return [continue_orbit(self.start, path, self.bounds, step=self.step, while_stable=self.while_stable)]
+            return list(switch_branch(self.start, self.bounds, both=False, **options))
+        return [continue_orbit(self.start, path, self.bounds, while_stable=self.while_stable, **options)]
 
 
 @dataclass
@@ -129,8 +130,7 @@ class DiagramWork:
     ) -> Judged:
         """`judge_unsettled` of states (n, m, d) at values (n,) of the parameter."""
         if self.parts is None:
-            found = judge_unsettled(self.system, states, {self.path: values}, settings=settings, earlier=earlier)
-            return replace(found, settled=found.settled.few(ALIKE, SETTLED))
+            return self._judge(values, states, settings, earlier, silent)
         numbers = asdict(settings)
         given = [of_one[np.isfinite(of_one).all(axis=-1)].tolist() for of_one in states]
         inputs = [{"value": v, "states": s, "settings": numbers} for v, s in zip(values.tolist(), given, strict=True)]
@@ -139,16 +139,22 @@ class DiagramWork:
                 one["earlier"] = row
         return _judged(np.array(self.parts.rows(self._kinds["judgements"], inputs)), settings.companions, self.system.dimension)
 
+    def _judge(
+        self, values: np.ndarray, states: np.ndarray, settings: JudgementSettings, earlier: Earlier | None, progress: Progress
+    ) -> Judged:
+        found = judge_unsettled(self.system, states, {self.path: values}, settings=settings, earlier=earlier, progress=progress)
+        return replace(found, settled=found.settled.few(ALIKE, SETTLED))
+
     def judge_all(self, questions: Sequence[tuple[np.ndarray, np.ndarray, JudgementSettings, Earlier | None]]) -> list[Judged]:
-        """`judge` several times, if nothing is kept and no other process computes all at once."""
+        """`judge` several times: all at once, or one after the other if results are kept or other processes compute."""
         if self.parts is not None:
             return [self.judge(*question) for question in questions]
-        return all_at_once([partial(self.judge, *question) for question in questions])
+        return all_at_once([partial(self._judge, *question) for question in questions])
 
-    def follow(self, requests: Sequence[Request]) -> list[list[Branch]]:
+    def follow(self, requests: Sequence[Request], progress: Progress = silent) -> list[list[Branch]]:
         """The branches of each request; those that the store lacks are computed at the same time."""
         if self.parts is None:
-            return [request.branches(self.path) for request in requests]
+            return [request.branches(self.path, progress) for request in requests]
         texts = self.parts.texts(self._kinds["branches"], [request.to_json() for request in requests])
         return [from_bytes(text) if text else request.branches(self.path) for request, text in zip(requests, texts, strict=True)]
 

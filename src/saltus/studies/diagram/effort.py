@@ -25,7 +25,7 @@ class EffortSettings:
 
     values: int  # Values of the parameter, evenly from bound to bound: what exists between two of them only may be missed.
     starts: int  # Initial states at each value: a basin of a smaller share of the window than 1 / starts may be missed there.
-    periods: int  # Forcing periods that a motion is given to settle; slow ones have 8 times as many.
+    periods: int  # Forcing periods that a motion is given to settle; slow ones up to 8 times as many.
     repelling_values: int  # Values at which repelling orbits are searched for; elsewhere their branches are followed.
     # Once there are this many branches, those born on others are not followed any more; so many repelling orbits are followed.
     branches: int

@@ -28,7 +28,7 @@ class SimulationSettings:
     innermost: float = 1e-2
     # An unsettled motion is taken as slow, not chaotic, if it returns to an earlier state within this share of its amplitude.
     slow: float = 1e-2
-    patience: int = 8  # Slow motions are followed for this many times the forcing periods of the others.
+    patience: int = 8  # Slow motions are followed for up to so many times the forcing periods of the others.
     # Chaotic motions return as near by chance. A slow motion is followed in rounds, as long as each round reduces the distance of
     # its return by this factor; otherwise it can hardly settle in the time that is left.
     nearer: float = 0.3
