@@ -42,8 +42,7 @@ def test_a_family_that_rests_comes_back_bit_for_bit(tmp_path):
 
 def test_a_family_that_rests_is_confirmed_over_its_whole_period():
     """The release alone is the same for every orbit: that of another amplitude starts there too, and moves otherwise."""
-    branch = family()
-    (data,) = confirmed({id(branch): branch.to_xarray()}, [branch], DiagramWork(SLOW, AMPLITUDE))
+    (data,) = confirmed([family()], DiagramWork(SLOW, AMPLITUDE))
     assert data["stable"].all()
     assert data["defect"].max() < 1e-10
     assert data["kept"].max() < 1e-8

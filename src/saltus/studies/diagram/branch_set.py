@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,9 +11,6 @@ from saltus.orbits import Branch, PeriodicOrbit, SpecialKind, SpecialPoint
 from saltus.progress import Progress, part_of, silent
 from saltus.studies.diagram.diagram_work import DiagramWork, Request
 from saltus.studies.diagram.placement import PlacedBranch
-
-if TYPE_CHECKING:
-    import xarray
 
 BRANCHING = (SpecialKind.PD, SpecialKind.BPC)  # at which other families are born
 
@@ -55,7 +51,6 @@ class BranchSet:
     parts: set[int] = field(default_factory=set)  # the partial branches that turned out to be parts of others
     compared: dict[int, int] = field(default_factory=dict)  # with how many branches each partial branch was compared
     left: int = 0  # special points at which a family is born that is not followed
-    tables: dict[int, xarray.Dataset] = field(default_factory=dict)  # the datasets of branches, by their `id`
 
     def follow(self, orbit: PeriodicOrbit, while_stable: bool = False, progress: Progress = silent) -> None:
         """Follow an orbit unless it lies on a known branch: either only while it is stable, or all the way, and then also the
@@ -85,14 +80,6 @@ class BranchSet:
     def branches(self) -> list[Branch]:
         """The branches, in the order in which they were followed, without those that turned out to be parts of others."""
         return [placed.branch for placed in self.placed if not (id(placed) in self.partial and self._is_part(placed))]
-
-    def tabulated(self, progress: Progress = silent) -> dict[int, xarray.Dataset]:
-        """The datasets of the branches by their `id`; those that were made before are kept."""
-        for branch in self.branches:
-            if id(branch) not in self.tables:
-                self.tables[id(branch)] = branch.to_xarray()
-                progress(1.0, "tabulating branches")
-        return self.tables
 
     @property
     def _whole(self) -> list[Branch]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -61,8 +60,7 @@ def diagram_tree(search: DiagramSearch, **facts: Any) -> xarray.DataTree:
         samples_tried=search.missed.samples,
     )
     order = sorted(range(len(branches)), key=lambda i: (branches[i].points[0].orbit.period, -len(branches[i].points)))
-    tables = confirmed(search.branches.tabulated(), [branches[i] for i in order], search.work)
-    nodes = {"/": xarray.Dataset(attrs=attributes), **branch_tables(tables)}
+    nodes = {"/": xarray.Dataset(attrs=attributes), **branch_tables(confirmed([branches[i] for i in order], search.work))}
     chaos = search.chaos
     bands = {"bands": band_dataset()} if chaos is None else explained(system, chaos, branches).to_datasets()
     found = {"attractors": _attractors(search), "unplaced": _unplaced(search)}
@@ -82,13 +80,13 @@ def _limits(system: System, path: str, bounds: tuple[float, float]) -> list[floa
     return low if low == high else []
 
 
-def confirmed(tables: Mapping[int, xarray.Dataset], branches: list[Branch], work: DiagramWork) -> list[xarray.Dataset]:
-    """The datasets of branches, given by their `id`, with the distance by which simulated orbits miss themselves: `defect` after
-    one period, `kept` after 20 periods, for stable orbits.
+def confirmed(branches: list[Branch], work: DiagramWork) -> list[xarray.Dataset]:
+    """The datasets of branches, with the distance by which simulated orbits miss themselves: `defect` after one period, `kept`
+    after 20 periods, for stable orbits.
 
     An orbit with stable multipliers whose motion does not stay on it is not called stable; `unconfirmed` counts these.
     """
-    found = [tables[id(branch)] for branch in branches]
+    found = [branch.to_xarray() for branch in branches]
     ends = np.cumsum([0, *(len(branch.orbits) for branch in branches)])
     orbits = [orbit for branch in branches for orbit in branch.orbits]
     stable = np.flatnonzero(np.concatenate([np.zeros(0), *(data["stable"].values for data in found)]))

@@ -249,8 +249,7 @@ class DiagramSearch:
             self._beside(more, look, part_of(progress, 0.3, 0.4))
         later = _without_repetition(self.found.motions.only(slice(known, None)))  # without those that the search knows already
         self._take_begun()
-        locate = partial(search.locate, later, band_origins(self.branches.branches))
-        self._beside(self.branches.tabulated, locate, part_of(progress, 0.4, 0.7))
+        search.locate(later, band_origins(self.branches.branches), part_of(progress, 0.4, 0.7))
         self._take_begun()
         self._beside(self.follow, search.confirm, part_of(progress, 0.7, 1.0))
         self._take_begun()
@@ -261,15 +260,15 @@ class DiagramSearch:
         self.branches.grow(progress)
         self.carry_on(progress)
 
-    def _beside(self, branches: Callable[[Progress], object], here: Callable[[Progress], object], progress: Progress) -> None:
-        """Do something else while branches are followed or tabulated, which it neither needs nor changes.
+    def _beside(self, follow: Callable[[Progress], object], here: Callable[[Progress], object], progress: Progress) -> None:
+        """Do something else while branches are followed, which it neither needs nor changes.
 
         One comes after the other if other processes compute, or if results are kept.
         """
         if self.work.parts is None:
-            side_by_side(branches, here, progress)
+            side_by_side(follow, here, progress)
         else:
-            branches(progress)
+            follow(progress)
             here(progress)
 
     def _take_begun(self) -> None:
