@@ -131,6 +131,12 @@ class BandSearch(SearchedRange):
         self.confirm(part_of(progress, 0.5, 1.0))
         progress(1.0, "looking for chaos")
 
+    def begin(self, motions: SimulatedMotions, progress: Progress = silent) -> None:
+        """The part of `locate` for which branches need not be known: judge motions, and halve intervals between chaos."""
+        self.given.append(motions)
+        self.take(motions)
+        self.refine(progress, inside=True)
+
     def locate(self, motions: SimulatedMotions, special: Iterable[BandOrigin] = (), progress: Progress = silent) -> None:
         """Locate the edges of bands and of windows, from these new motions and beside these special points."""
         self.given.append(motions)
@@ -171,15 +177,17 @@ class BandSearch(SearchedRange):
         at = bisect_left(self.places, SearchedValue(value))
         return 0 < at < len(self.places) and all(place.chaotic for place in self.places[at - 1 : at + 1])
 
-    def refine(self, progress: Progress = silent) -> None:
-        """Halve intervals and carry chaos to neighbouring values, until neither shows anything new.
+    def refine(self, progress: Progress = silent, inside: bool = False) -> None:
+        """Halve intervals and carry chaos to neighbouring values, until neither shows anything new; or, if asked, only halve
+        intervals between two values with chaos.
 
         All motions of a round are simulated together, as a few motions take nearly as long as many.
         """
         for number in itertools.count():
             progress(1.0 - SLOWER**number, f"looking for chaos, values: {len(self.places)}")
-            middles = [(a, b) for a, b in itertools.pairwise(self.places) if self._is_of_interest(a, b)]
-            carried = self._to_carry()
+            pairs = ((a, b) for a, b in itertools.pairwise(self.places) if not inside or (a.chaotic and b.chaotic))
+            middles = [(a, b) for a, b in pairs if self._is_of_interest(a, b)]
+            carried = [] if inside else self._to_carry()
             if not middles and not carried:
                 return
             begun = [Begun(b.value, a.starts(self.settings.seeds, 0)) for a, b in carried]

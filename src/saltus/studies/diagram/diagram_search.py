@@ -66,17 +66,10 @@ class DiagramSearch:
     prepared: set[int] = field(default_factory=set)  # rows of motions whose branches were computed at once with others
 
     def simulate(self, progress: Progress = silent) -> None:
-        """The simulation of the diagram: motions from the starts at every value of the grid, then from those at neighbouring
-        values, until these show nothing new."""
+        """The simulation of the diagram: motions from the starts at every value of the grid."""
         states = starts_at(self.system, self.grid, self.effort.starts, self.window, self.seed)
         motions = self.simulated(np.repeat(self.grid, self.effort.starts), states.reshape(-1, self.system.dimension), progress)
-        self.found, since = AttractorsFound(motions, self.max_period), 0
-        none = stable_motions([], self.grid, self.system.dimension)
-        for _ in range(SETTINGS.rounds):
-            values, states = self.found.seeds(self.system, self.grid, none, since)
-            since = len(self.found.motions)
-            if not len(values) or not self.found.add(self.simulated(values, states)):
-                return
+        self.found = AttractorsFound(motions, self.max_period)
 
     def simulated(self, values: np.ndarray, states: np.ndarray, progress: Progress = silent) -> SimulatedMotions:
         """Motions from states (n, d) at values (n,), as long as the effort says."""
@@ -242,23 +235,23 @@ class DiagramSearch:
     def _look_for_chaos(
         self, motions: SimulatedMotions, progress: Progress, more: Callable[[Progress], object] | None = None
     ) -> None:
-        """Look for chaos from motions, while branches are followed.
+        """Look for chaos from motions, while the orbits on which motions settle are followed.
 
-        Each step begins with what was found before: the branches' special points, the motions from neighbouring values that
-        `more` follows, and the motions of the search for chaos, on which orbits are followed.
+        What depends on branches comes when these are known: motions beside their special points, and the motions that `more`
+        follows from neighbouring values.
         """
         assert self.band_search is not None
         search, known = self.band_search, len(self.found.motions)
-        self._beside(self.follow, partial(search.locate, _without_repetition(motions), ()), part_of(progress, 0.0, 0.4))
+        begin = partial(search.begin, _without_repetition(motions))
+        self._beside(self.follow, begin, part_of(progress, 0.0, 0.3))
         if more is not None:
-            locate = partial(search.locate, motions.only(slice(0)), band_origins(self.branches.branches))
-            self._beside(more, locate, part_of(progress, 0.4, 0.5))
+            look = partial(search.beside_special_points, band_origins(self.branches.branches))
+            self._beside(more, look, part_of(progress, 0.3, 0.4))
         later = _without_repetition(self.found.motions.only(slice(known, None)))  # without those that the search knows already
         self._take_begun()
-        locate = partial(search.locate, later, band_origins(self.branches.branches))
-        self._beside(self.follow, locate, part_of(progress, 0.5, 0.75))
+        search.locate(later, band_origins(self.branches.branches), part_of(progress, 0.4, 0.7))
         self._take_begun()
-        self._beside(self.follow, search.confirm, part_of(progress, 0.75, 1.0))
+        self._beside(self.follow, search.confirm, part_of(progress, 0.7, 1.0))
         self._take_begun()
 
     def _follow_more(self, repelling: int, progress: Progress) -> None:
