@@ -166,7 +166,7 @@ class DiagramSearch:
             return Place.NO_ORBIT
         known = len(self.branches.placed)
         self.branches.follow(orbit, while_stable and orbit.stable, progress)
-        if self._is_placed(row, self.branches.placed[known:]):
+        if self._is_placed(row, self.branches.placed[known:]) or (orbit.stable and self.branches.knows(orbit)):
             return Place.ON_BRANCH
         return Place.ELSEWHERE if orbit.stable else Place.UNSTABLE
 

@@ -126,9 +126,9 @@ class PlacedBranch:
             return False
         seen = _seen(orbit)
         for before in self.crossings(np.array([value]), stable=False)[1].tolist():
-            expected, _, change = self.extrema(np.array([value]), np.array([before]))
-            near = SETTINGS.near * max(orbit.amplitude, SETTINGS.least) + 2.0 * change[0]
-            if self.columns[4, before] == orbit.period and _apart(seen, expected[0], True) <= near:
+            ends = self.columns[SEEN][:, before : before + 2].T  # a cubic may be far off beside narrow peaks
+            near = SETTINGS.near * max(orbit.amplitude, SETTINGS.least) + 2.0 * np.abs(ends[1] - ends[0]).max()
+            if self.columns[4, before] == orbit.period and min(_apart(seen, end, True) for end in ends) <= near:
                 other = self.solved(value, before)
                 if other is not None and same_orbit(orbit, other):
                     return True
