@@ -1,0 +1,35 @@
+"""The comparison of orbits and motions with the branches of a diagram."""
+
+import numpy as np
+from shared_systems import forced
+
+from saltus import continue_orbit, find_orbit
+from saltus.studies.diagram.placement import PlacedBranch
+from saltus.studies.diagram.simulated import SETTINGS, followed, simulate_from
+
+FREQUENCY = "load.frequency"
+
+
+def test_a_branch_holds_its_own_orbits_beside_its_narrow_peak():
+    """The primary resonance at Hhat = 0.2 (Fig. 9a), whose amplitude changes by 0.05 rad within 1e-4 of the frequency."""
+    branch = continue_orbit(find_orbit(forced(0.2, 2.08925), theta=0.05, velocity=0.05), FREQUENCY, (0.1, 3.75))
+    placed = PlacedBranch(branch)
+    values = np.append(np.linspace(0.8305, 0.8325, 41), 0.8320974845378502)  # the last one is where a diagram met it
+    found = [(orbit, value) for value in values.tolist() for orbit in branch.at(value)]
+    assert len(found) >= len(values)
+    assert all(placed.holds(orbit, value) for orbit, value in found)
+
+
+def test_chaotic_motions_that_return_by_chance_are_soon_given_up():
+    """Chance rarely lets a chaotic motion return ever nearer: few of those taken as slow are followed to the last round."""
+    system, counts, n, periods = forced(0.2, 0.38), [], 200, 100
+    states = np.random.default_rng(5).uniform(-0.1, 0.1, (n, 2))
+
+    def follow(values, begun, asked, progress):
+        counts.append(len(values))
+        return followed(system, FREQUENCY, values, begun, asked)
+
+    motions = simulate_from(system, FREQUENCY, np.full(n, 0.38), states, periods, follow=follow)
+    assert motions.unsettled.mean() > 0.9
+    assert counts[0] == n
+    assert 0 < sum(counts[1:]) < 0.5 * SETTINGS.patience * counts[1]
