@@ -38,17 +38,14 @@ class Question(NamedTuple):
 
 @dataclass
 class SearchedRange:
-    """What is known between two values of a parameter, and all motions that were given or have been begun there.
-
-    Long computations are done by `work`.
-    """
+    """What is known between two values of a parameter; long computations are done by `work`."""
 
     work: DiagramWork
     bounds: tuple[float, float]
     settings: ChaosSettings = SETTINGS
     places: list[SearchedValue] = field(default_factory=list)  # by value
-    given: list[SimulatedMotions] = field(default_factory=list)
-    begun: list[SimulatedMotions] = field(default_factory=list)
+    given: list[SimulatedMotions] = field(default_factory=list)  # motions that were simulated before, in the order of the calls
+    begun: list[SimulatedMotions] = field(default_factory=list)  # motions that the search has begun itself
 
     @property
     def bands(self) -> Bands:
