@@ -308,8 +308,8 @@ REFUSED += ("sweep.status",)
 @pytest.fixture
 def alone(monkeypatch, tmp_path):
     """A folder of one's own, and nothing is computed."""
-    from saltus.flow import simulation
-    from saltus.flow.ensemble import ensemble
+    from saltus.flow.lanes import ensemble
+    from saltus.flow.motion import simulate as simulation
     from saltus.orbits import problem
 
     def begun(*_, **__):

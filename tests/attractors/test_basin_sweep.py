@@ -38,7 +38,9 @@ def test_what_is_kept_is_gone_on_with(tmp_path, monkeypatch):
 
 def test_the_store_of_something_else_is_refused_before_anything_is_computed(tmp_path, monkeypatch):
     basins_of_attraction(SYSTEM, theta=[0.5], velocity=[0.0], store=tmp_path / "store")
-    monkeypatch.setattr("saltus.flow.recurrence.simulate_many", lambda *args, **more: pytest.fail("it began to compute"))
+    monkeypatch.setattr(
+        "saltus.flow.long_time.recurrence.simulate_many", lambda *args, **more: pytest.fail("it began to compute")
+    )
     with pytest.raises(ParameterError, match="of the basins of another system; name another store"):
         basins_of_attraction(forced(1.0, W=2.5), theta=[0.5], velocity=[0.0], store=tmp_path / "store")
     (tmp_path / "file").write_text("mine")

@@ -56,8 +56,8 @@ class Computed(Exception):
 def asked(saltus, tmp_path, monkeypatch):
     """Ask with one key changed: the sentence with which it is refused, or None where it would be computed."""
     import saltus.cli.run_command as command
-    from saltus.flow import simulation
-    from saltus.flow.ensemble import ensemble
+    from saltus.flow.lanes import ensemble
+    from saltus.flow.motion import simulate as simulation
 
     def begun(*_, **__):
         raise Computed

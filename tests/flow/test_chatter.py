@@ -15,12 +15,12 @@ from scipy.integrate import quad
 from shared_systems import BETA80, forced
 
 from saltus.flow import EventKind, simulate
-from saltus.flow.compiled import load_kernel
-from saltus.flow.kernel_layout import Mode, Status, Where
-from saltus.flow.kernel_state import KernelState
-from saltus.flow.memory_layout import State
-from saltus.flow.request import MotionRequest
-from saltus.flow.structures import program
+from saltus.flow.kernel.compiled import load_kernel
+from saltus.flow.kernel.layout import Mode, Status, Where
+from saltus.flow.kernel.memory_layout import State
+from saltus.flow.kernel.structures import program
+from saltus.flow.motion.request import MotionRequest
+from saltus.flow.one_contact.state import KernelState
 from saltus.systems import EnergyRestitution, Harmonic, Load, System, WallOscillator
 
 

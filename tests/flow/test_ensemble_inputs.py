@@ -13,7 +13,7 @@ from lane_cases import Duffing
 import saltus
 from saltus.errors import ParameterError, SaltusError
 from saltus.flow import share_cores, stop_names
-from saltus.flow.ensemble.wanted import read_threads
+from saltus.flow.lanes.wanted import read_threads
 from saltus.systems import Harmonic, Load, Metainterface, Record, System, WallOscillator
 
 SYSTEM = System(model=Metainterface(beta0=1.4, damping=0.1), load=Load(frequency=1.0, horizontal=Harmonic(0.3), vertical=-0.5))
@@ -389,7 +389,7 @@ def test_a_record_and_a_model_without_contact_take_columns_too():
 
 def test_processes_that_compute_at_the_same_time_share_the_cores(monkeypatch):
     monkeypatch.setattr("os.sched_getaffinity", lambda process: set(range(8)), raising=False)
-    monkeypatch.setattr("saltus.flow.ensemble.threads._sharing", [lambda: 1])
+    monkeypatch.setattr("saltus.flow.lanes.threads._sharing", [lambda: 1])
     assert read_threads(None) == 8
     for processes, threads in ((2, 4), (3, 2), (8, 1), (20, 1), (0, 8)):
         share_cores(lambda count=processes: count)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numba import njit, types
 
-from saltus.flow import kernel_layout
-from saltus.flow.ensemble import lane_layout, lane_steps, meeting
-from saltus.flow.memory_layout import HIGHEST_ORDER, LOWEST_ORDER, SERIES_LENGTH, LanePart
+from saltus.flow.kernel import layout as kernel_layout
+from saltus.flow.kernel.memory_layout import HIGHEST_ORDER, LOWEST_ORDER, SERIES_LENGTH, LanePart
+from saltus.flow.lanes import lane_layout, lane_steps, meeting
 from saltus.taylor import compiled_part, lane_vectors, private_numba
 from saltus.taylor.lane_vectors import (
     ALL,

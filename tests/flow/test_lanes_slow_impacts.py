@@ -9,9 +9,9 @@ from shared_systems import BETA80, forced
 
 import saltus
 from saltus.flow import stop_names
-from saltus.flow.ensemble import threads
-from saltus.flow.ensemble.function_types import SCALAR_MOTION
-from saltus.flow.kernel_layout import CHATTER_SPEED, SLOW, Status
+from saltus.flow.kernel.layout import CHATTER_SPEED, SLOW, Status
+from saltus.flow.lanes import threads
+from saltus.flow.lanes.function_types import SCALAR_MOTION
 from saltus.systems import EnergyRestitution, Load, System, VelocityReduction, WallOscillator
 from saltus.taylor import pointer, pointers
 from saltus.taylor.private_numba import OPTIONS

@@ -5,7 +5,7 @@ import pytest
 from test_contact_models import chain
 from test_contacts import layers
 
-from saltus.flow.compiled import one_free
+from saltus.flow.kernel.compiled import one_free
 from saltus.systems import Load, System, TwoCells, TwoStops, constrained_acceleration, reactions
 from saltus.taylor import Expr, differentiate, substitute, trace
 

@@ -9,7 +9,7 @@ import pytest
 
 from saltus.errors import ParameterError, SaltusError
 from saltus.flow import simulate
-from saltus.flow.structures import _structures
+from saltus.flow.kernel.structures import _structures
 from saltus.systems import Harmonic, Load, Model, System, VelocityReduction, WallOscillator
 from saltus.systems.registry import MODELS, register
 from saltus.taylor.cache import cache_directory

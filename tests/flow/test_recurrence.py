@@ -6,7 +6,7 @@ from shared_systems import forced
 
 import saltus
 from saltus.flow import RECURRENCE, Outcome, find_recurrence, load_releases, nearest_return, return_distances, return_period
-from saltus.flow.recurrence import _long_period
+from saltus.flow.long_time.recurrence import _long_period
 from saltus.systems import Harmonic, Load, RockingBlock, System
 
 STATES = np.random.default_rng(1).uniform(-1.5, 1.5, (32, 2))
@@ -14,7 +14,7 @@ AMPLITUDE = "load.horizontal.amplitude"
 
 
 def test_the_numbers_are_those_of_the_compiled_lanes():
-    from saltus.flow.ensemble.sampling import LONGEST_RECURRENCE
+    from saltus.flow.lanes.sampling import LONGEST_RECURRENCE
 
     assert RECURRENCE.compiled_max_period == LONGEST_RECURRENCE
 

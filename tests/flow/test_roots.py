@@ -9,9 +9,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from saltus.flow import roots
-from saltus.flow.kernel_layout import ZERO
-from saltus.flow.roots import NEVER, NONE, SIMPLE
+from saltus.flow.kernel import roots
+from saltus.flow.kernel.layout import ZERO
+from saltus.flow.kernel.roots import NEVER, NONE, SIMPLE
 from saltus.taylor import compiled_part
 from saltus.taylor.private_numba import OPTIONS
 

@@ -7,7 +7,7 @@ import pytest
 from generated_functions import Generated
 from shared_systems import paired
 
-from saltus.flow.event_derivatives import saltation
+from saltus.flow.kernel.event_derivatives import saltation
 from saltus.systems import (
     EnergyRestitution,
     Harmonic,

@@ -29,8 +29,8 @@ class Computed(BaseException):
 @pytest.fixture
 def nothing_is_computed(monkeypatch):
     """Every motion ends the case, before it begins."""
-    from saltus.flow import simulation
-    from saltus.flow.ensemble import ensemble
+    from saltus.flow.lanes import ensemble
+    from saltus.flow.motion import simulate as simulation
     from saltus.orbits import problem
 
     def begun(*_, **__):

@@ -9,7 +9,8 @@ from scipy.integrate import solve_ivp
 from shared_systems import hinged, paired, walled
 
 from saltus import simulate
-from saltus.flow import segments as at
+from saltus.flow import SegmentColumn, SegmentValue
+from saltus.flow.one_contact.segments import SHORT
 from saltus.orbits.problem import Problem, Segments
 from saltus.orbits.signature import Signature
 from saltus.systems import Harmonic, Load, Model, System, VelocityReduction
@@ -46,9 +47,9 @@ def test_extrema_of_segments_are_those_of_the_motion(name):
     for i in range(len(times) - 1):
         x, _ = motion.at(np.linspace(times[i], times[i + 1], 4001))
         fine = 1e-6  # a parabola between samples
-        assert x.max() - 1e-11 <= extremes[i, at.TOP] <= x.max() + fine
-        assert x.min() - fine <= extremes[i, at.BOTTOM] <= x.min() + 1e-11
-        assert extremes[i, at.HUMP] > 0.0
+        assert x.max() - 1e-11 <= extremes[i, SegmentColumn.HIGHEST] <= x.max() + fine
+        assert x.min() - fine <= extremes[i, SegmentColumn.LOWEST] <= x.min() + 1e-11
+        assert extremes[i, SegmentColumn.LOWEST_GAP] > 0.0
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -109,7 +110,7 @@ def test_derivatives_do_not_jump_where_the_short_segments_begin(name):
         equations = problem.evaluate(unknowns, problem.values)
         return np.concatenate([equations.jacobian()[:2].ravel(), equations.parameters[:2].ravel()])
 
-    limit, scale = at_duration(0.0), at.SHORT
+    limit, scale = at_duration(0.0), SHORT
     for duration in (0.5 * scale, 0.999 * scale, 1.001 * scale, 5 * scale, -0.999 * scale, -1.001 * scale):
         assert np.abs(at_duration(duration) - limit).max() < 20 * abs(duration) + 1e-9
 
@@ -174,7 +175,7 @@ def test_steps_of_a_segment_are_checked_with_the_equation_of_its_own_side(side, 
         return [y[1], model.acceleration(t, y[0], y[1], side, load)]
 
     expected = solve_ivp(rate, (0.0, 1.5), start, method="DOP853", rtol=1e-12, atol=1e-14, max_step=1e-3).y[:, -1]
-    assert followed.ends[0, at.KINDS : at.KINDS + 2] == pytest.approx(expected, abs=1e-9)
+    assert followed.ends[0, SegmentValue.FIRST_STATE : SegmentValue.FIRST_STATE + 2] == pytest.approx(expected, abs=1e-9)
 
 
 def test_lowest_gap_inside_a_segment_and_its_instant():
@@ -190,9 +191,9 @@ def test_lowest_gap_inside_a_segment_and_its_instant():
     x = np.exp(-c * times / 2) * (wall * np.cos(w * times) + (v + c * wall / 2) / w * np.sin(w * times))
     tops = [i for i in range(1, len(x) - 1) if x[i - 1] < x[i] >= x[i + 1]]
     top = max(tops, key=lambda i: x[i])
-    assert extremes[at.HUMP] == pytest.approx(wall - x[top], abs=1e-9)
-    assert extremes[at.HUMP] < 0.0
-    assert extremes[at.HUMP_TIME] - 0.3 == pytest.approx(times[top], abs=4e-5)
+    assert extremes[SegmentColumn.LOWEST_GAP] == pytest.approx(wall - x[top], abs=1e-9)
+    assert extremes[SegmentColumn.LOWEST_GAP] < 0.0
+    assert extremes[SegmentColumn.LOWEST_GAP_TIME] - 0.3 == pytest.approx(times[top], abs=4e-5)
 
 
 def test_parameters_that_leave_the_model_its_meaning_are_refused_by_the_system_and_survive_the_equations():

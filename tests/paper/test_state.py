@@ -104,7 +104,7 @@ def test_other_parameters_make_it_again(tmp_path, registry):
         ("saltus.paper.figures.fig08", True),
         ("saltus.theory.quasi_static", True),  # inner files of rooms, whose names come through the front door
         ("saltus.theory.loaded_equilibria", True),
-        ("saltus.flow.roots", True),
+        ("saltus.flow.kernel.roots", True),
         ("saltus.systems.metainterface", True),
         ("saltus.plots.loading_paths", True),
         ("saltus.paper.figures.fig09", False),

@@ -5,8 +5,8 @@ from functools import cache
 import numpy as np
 from numba import njit
 
-from saltus.flow import function_types
-from saltus.flow.compiled import load_structure
+from saltus.flow.kernel import function_types
+from saltus.flow.kernel.compiled import load_structure
 from saltus.systems.parameters import numbers
 from saltus.taylor import record_table, trace
 from saltus.taylor.private_numba import function_type, pointers

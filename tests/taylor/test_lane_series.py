@@ -9,12 +9,12 @@ from numba import njit, types
 from power_series import solution
 from test_series import OPERATIONS, agrees, force
 
-from saltus.flow.ensemble.compiled_lanes import load_lane_functions
-from saltus.flow.ensemble.function_types import LANE_SERIES
-from saltus.flow.ensemble.threads import lane_order
-from saltus.flow.memory_layout import HIGHEST_ORDER, LOWEST_ORDER, LanePart, LaneSlot
-from saltus.flow.memory_layout import SERIES_LENGTH as STRIDE
-from saltus.flow.structures import program
+from saltus.flow.kernel.memory_layout import HIGHEST_ORDER, LOWEST_ORDER, LanePart, LaneSlot
+from saltus.flow.kernel.memory_layout import SERIES_LENGTH as STRIDE
+from saltus.flow.kernel.structures import program
+from saltus.flow.lanes.compiled_lanes import load_lane_functions
+from saltus.flow.lanes.function_types import LANE_SERIES
+from saltus.flow.lanes.threads import lane_order
 from saltus.systems import Harmonic, Load, Model, Record, System, WallOscillator
 from saltus.taylor import private_numba as jit
 from saltus.taylor.graph import RECORD_WIDTH

@@ -16,7 +16,7 @@ import numba
 import pytest
 
 import saltus
-from saltus.flow.compiled import kernel_module, load_kernel
+from saltus.flow.kernel.compiled import kernel_module, load_kernel
 from saltus.taylor.cache import cache_directory, load_module
 from saltus.taylor.private_numba import CONTEXT, LIBRARY
 

@@ -13,7 +13,7 @@ import pytest
 from generated_functions import Generated
 from power_series import solution
 
-from saltus.flow.compiled import structure_text
+from saltus.flow.kernel.compiled import structure_text
 from saltus.systems import (
     EnergyRestitution,
     Harmonic,

@@ -1,23 +1,21 @@
-from .approach import approached
-from .compiled import load_contact_segments, load_segments
-from .contacts.contact_layout import ContactColumn, SegmentEnd, SegmentExtremes, SegmentPlan
-from .dense_output import DenseOutput
-from .ensemble.capture_speeds import captured_between
-from .ensemble.compiled_lanes import load_advance, load_driver, load_helpers
-from .ensemble.dataset_reading import stop_names, stroboscopic
-from .ensemble.ensemble import compiled_lanes, simulate_many
-from .ensemble.ensemble_dataset import extrema_names
-from .ensemble.inputs import Inputs, read_inputs
-from .ensemble.tangent_ensemble import TangentEnsemble
-from .ensemble.threads import Jobs, Lanes, available_cores, share_cores
-from .ensemble.wanted import Wanted
-from .kernel_layout import STRUCTURE_SIZES, Where
-from .load_release import Release, contact_pull, load_releases, peak_near
-from .memory_layout import EventCode
-from .modes import modes_of
-from .motion import Event, EventKind, Impacts, Motion
-from .motion_dataset import rate_name, state_names
-from .recurrence import (
+from .contacts.layout import ContactColumn, SegmentEnd, SegmentExtremes, SegmentPlan
+from .contacts.modes import modes_of
+from .kernel.compiled import load_contact_segments, load_segments
+from .kernel.layout import STRUCTURE_SIZES, SegmentColumn, SegmentValue, Where
+from .kernel.memory_layout import EventCode
+from .kernel.structures import Program, limits_of, program, taylor_order
+from .lanes.capture_speeds import captured_between
+from .lanes.compiled_lanes import load_advance, load_driver, load_helpers
+from .lanes.dataset_reading import stop_names, stroboscopic
+from .lanes.ensemble import compiled_lanes, simulate_many
+from .lanes.ensemble_dataset import extrema_names
+from .lanes.inputs import Inputs, read_inputs
+from .lanes.tangent_ensemble import TangentEnsemble
+from .lanes.threads import Jobs, Lanes, available_cores, share_cores
+from .lanes.wanted import Wanted
+from .long_time.approach import approached
+from .long_time.load_release import Release, contact_pull, load_releases, peak_near
+from .long_time.recurrence import (
     RECURRENCE,
     Outcome,
     Recurrence,
@@ -30,13 +28,15 @@ from .recurrence import (
     return_distances,
     return_period,
 )
-from .regularity import ContactRegularity, contact_regularity
-from .request import MotionRequest
-from .sensitivity import Sensitivities, derivatives_of, sensitivities, state_rates
-from .simulation import simulate
-from .stops import Stop
-from .structures import Program, limits_of, program, taylor_order
-from .validity import Validity
+from .motion.dataset import rate_name, state_names
+from .motion.dense_output import DenseOutput
+from .motion.motion import Event, EventKind, Impacts, Motion
+from .motion.request import MotionRequest
+from .motion.sensitivities import Sensitivities, derivatives_of, sensitivities, state_rates
+from .motion.simulate import simulate
+from .motion.stops import Stop
+from .motion.validity import Validity
+from .one_contact.regularity import ContactRegularity, contact_regularity
 
 __all__ = [
     "RECURRENCE",
@@ -58,9 +58,11 @@ __all__ = [
     "Recurrence",
     "RecurrenceSettings",
     "Release",
+    "SegmentColumn",
     "SegmentEnd",
     "SegmentExtremes",
     "SegmentPlan",
+    "SegmentValue",
     "Sensitivities",
     "Stop",
     "TangentEnsemble",

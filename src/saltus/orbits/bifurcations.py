@@ -11,7 +11,7 @@ import numpy as np
 
 from saltus.bounds import area_contraction
 from saltus.continuation import TestFunction
-from saltus.flow import segments as at
+from saltus.flow import SegmentColumn
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.orbit_curve import OrbitPoint
 from saltus.orbits.special_point import SpecialKind, UserFunction
@@ -99,7 +99,7 @@ def touching(point: OrbitPoint) -> float:
     """How far an orbit is from touching a contact that is no singularity; the sign changes with each additional pair of passages
     through the contact."""
     orbit, extremes = point.orbit, point.equations.extremes
-    pairs = int(extremes[:, at.CROSSINGS].sum()) // 2
+    pairs = int(extremes[:, SegmentColumn.CROSSINGS].sum()) // 2
     return float((-1) ** pairs * min(NEAREST, orbit.clearance, orbit.shallowest))
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from saltus.continuation import End, TestFunction
-from saltus.flow import segments as at
+from saltus.flow import SegmentColumn
 from saltus.orbits.bifurcations import scaled_determinant
 from saltus.orbits.conditions import Singular, cubic, quadratic
 from saltus.orbits.grazing import removed
@@ -58,7 +58,7 @@ def room(point: SpecialCurvePoint) -> float:
     n = len(orbit.signature.sides)
     speeds = np.delete(point.solution.unknowns[1::2], touching) if n else np.empty(0)
     extremes = point.equations.extremes
-    humps, phases = extremes[:, at.HUMP], extremes[:, at.HUMP_TIME] * orbit.frequency
+    humps, phases = extremes[:, SegmentColumn.LOWEST_GAP], extremes[:, SegmentColumn.LOWEST_GAP_TIME] * orbit.frequency
     if touching:
         touch = point.solution.unknowns[2 * touching[0]]
         away = np.abs(np.array([phases - touch + turn * orbit.problem.closing for turn in (-1, 0, 1)])).min(axis=0)

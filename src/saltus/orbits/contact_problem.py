@@ -16,8 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
-from saltus.flow import ContactColumn, EventCode, SegmentEnd, SegmentExtremes, SegmentPlan, load_contact_segments
-from saltus.flow import segments as at
+from saltus.flow import ContactColumn, EventCode, SegmentColumn, SegmentEnd, SegmentExtremes, SegmentPlan, load_contact_segments
 from saltus.orbits.followed_problem import FollowedProblem
 from saltus.orbits.problem import ORBIT_TOLERANCE, Equations, Problem
 from saltus.orbits.signature import ModeChange, Signature
@@ -211,12 +210,14 @@ class ContactProblem(Problem):
         return ContactEquations(residual, here, there, total[:, parameters:], ends, self._extremes(seen), seen, first)
 
     def _extremes(self, seen: np.ndarray) -> np.ndarray:
-        """The extremes along the segments, in the columns that orbits with one contact use (`flow/segments.py`)."""
-        extremes = np.full((len(seen), at.LEAST_MARGIN + max(1, len(self.margins))), np.inf)
-        extremes[:, [at.TOP, at.BOTTOM]] = seen[:, [SegmentExtremes.TOP, SegmentExtremes.BOTTOM]]
-        extremes[:, [at.HUMP, at.HUMP_TIME]] = seen[:, [SegmentExtremes.GAP, SegmentExtremes.GAP + 1]]
-        extremes[:, at.CROSSINGS] = 0.0
-        extremes[:, at.LEAST_MARGIN :] = seen[:, SegmentExtremes.MARGINS :]
+        """The extremes along the segments, in the columns that orbits with one contact use (`flow/one_contact/segments.py`)."""
+        extremes = np.full((len(seen), SegmentColumn.LEAST_MARGIN + max(1, len(self.margins))), np.inf)
+        extremes[:, [SegmentColumn.HIGHEST, SegmentColumn.LOWEST]] = seen[:, [SegmentExtremes.TOP, SegmentExtremes.BOTTOM]]
+        extremes[:, [SegmentColumn.LOWEST_GAP, SegmentColumn.LOWEST_GAP_TIME]] = seen[
+            :, [SegmentExtremes.GAP, SegmentExtremes.GAP + 1]
+        ]
+        extremes[:, SegmentColumn.CROSSINGS] = 0.0
+        extremes[:, SegmentColumn.LEAST_MARGIN :] = seen[:, SegmentExtremes.MARGINS :]
         return extremes
 
     def within(self, unknowns: np.ndarray, equations: Equations, values: np.ndarray) -> tuple[np.ndarray, float]:

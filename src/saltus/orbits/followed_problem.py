@@ -15,8 +15,17 @@ from functools import cached_property
 import numpy as np
 
 from saltus.errors import SaltusError
-from saltus.flow import Motion, MotionRequest, Program, Sensitivities, derivatives_of, limits_of, program, state_rates
-from saltus.flow import segments as at
+from saltus.flow import (
+    Motion,
+    MotionRequest,
+    Program,
+    SegmentColumn,
+    Sensitivities,
+    derivatives_of,
+    limits_of,
+    program,
+    state_rates,
+)
 from saltus.orbits.followed_events import FollowedEvents, events_of
 from saltus.orbits.problem import Equations, Problem
 from saltus.orbits.sampled_motion import SampledMotion
@@ -182,10 +191,12 @@ class FollowedProblem(Problem):
 
     def _extremes(self, sampled: SampledMotion | None) -> np.ndarray:
         """The extrema of all coordinates and the least values of the margins, in the columns that other orbits use."""
-        extremes = np.full((int(sampled is not None), at.LEAST_MARGIN + max(1, len(self.margins))), np.inf)
+        extremes = np.full((int(sampled is not None), SegmentColumn.LEAST_MARGIN + max(1, len(self.margins))), np.inf)
         if sampled is not None:
-            extremes[:, at.CROSSINGS] = 0.0
-            extremes[0, at.TOP], extremes[0, at.BOTTOM] = sampled.highest(), sampled.lowest()
+            extremes[:, SegmentColumn.CROSSINGS] = 0.0
+            extremes[0, SegmentColumn.HIGHEST], extremes[0, SegmentColumn.LOWEST] = sampled.highest(), sampled.lowest()
             least = sampled.margins() if self.margins else {}
-            extremes[0, at.LEAST_MARGIN : at.LEAST_MARGIN + len(self.margins)] = [least[name] for name in self.margins]
+            extremes[0, SegmentColumn.LEAST_MARGIN : SegmentColumn.LEAST_MARGIN + len(self.margins)] = [
+                least[name] for name in self.margins
+            ]
         return extremes

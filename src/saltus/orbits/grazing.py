@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.continuation import End
-from saltus.flow import segments as at
+from saltus.flow import SegmentColumn
 from saltus.orbits.bifurcations import grazing
 from saltus.orbits.contact_problem import ContactProblem
 from saltus.orbits.orbit_curve import OrbitPoint
@@ -94,8 +94,8 @@ def inserted(point: OrbitPoint) -> tuple[Problem, np.ndarray]:
     """The problem whose signature has additional impacts where the gap touches zero, and its unknowns: they have no speed."""
     problem, signature = point.orbit.problem, point.orbit.signature
     extremes = point.equations.extremes
-    segment = int(np.argmin(extremes[:, at.HUMP]))
-    phase = extremes[segment, at.HUMP_TIME] * problem.frequency(point.solution.values)
+    segment = int(np.argmin(extremes[:, SegmentColumn.LOWEST_GAP]))
+    phase = extremes[segment, SegmentColumn.LOWEST_GAP_TIME] * problem.frequency(point.solution.values)
     side = signature.along()[segment]
     sides = (side,) if _turns_round(problem, side) else (side, -side)
     touches = np.array([phase, 0.0] * len(sides))

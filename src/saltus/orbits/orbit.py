@@ -11,8 +11,7 @@ import numpy as np
 
 from saltus.checks import LIMITS, check_count
 from saltus.errors import MotionError
-from saltus.flow import Motion, Validity, simulate
-from saltus.flow import segments as at
+from saltus.flow import Motion, SegmentColumn, Validity, simulate
 from saltus.notebook import html_table
 from saltus.orbits.contact_problem import ContactProblem
 from saltus.orbits.followed_problem import FollowedProblem
@@ -159,13 +158,13 @@ class PeriodicOrbit(Result):
     @cached_property
     def highest(self) -> float:
         """The largest value of the coordinate; with several coordinates, of any of them."""
-        top, bottom = self._extremes[:, at.TOP].max(), self._extremes[:, at.BOTTOM].min()
+        top, bottom = self._extremes[:, SegmentColumn.HIGHEST].max(), self._extremes[:, SegmentColumn.LOWEST].min()
         return float(max(top, -bottom) if self.symmetric else top)
 
     @cached_property
     def lowest(self) -> float:
         """The least value of the coordinate; with several coordinates, of any of them."""
-        return -self.highest if self.symmetric else float(self._extremes[:, at.BOTTOM].min())
+        return -self.highest if self.symmetric else float(self._extremes[:, SegmentColumn.LOWEST].min())
 
     @property
     def amplitude(self) -> float:
@@ -175,17 +174,17 @@ class PeriodicOrbit(Result):
     @cached_property
     def clearance(self) -> float:
         """The gap at its lowest minimum between impacts, inf without a minimum; if it is negative this is no real motion."""
-        return float(self._extremes[:, at.HUMP].min())
+        return float(self._extremes[:, SegmentColumn.LOWEST_GAP].min())
 
     @property
     def crossings(self) -> int:
         """How often it passes through a contact that is no singularity, in one of its periods; 0 for orbits with impacts."""
-        return int(self._extremes[:, at.CROSSINGS].sum()) * (2 if self.symmetric else 1)
+        return int(self._extremes[:, SegmentColumn.CROSSINGS].sum()) * (2 if self.symmetric else 1)
 
     @property
     def shallowest(self) -> float:
         """The least depth of its passages beyond a contact that is no singularity, on either side; inf without passages."""
-        return float(self._extremes[:, at.SHALLOWEST].min())
+        return float(self._extremes[:, SegmentColumn.SHALLOWEST].min())
 
     @cached_property
     def slowest(self) -> float:
@@ -208,7 +207,7 @@ class PeriodicOrbit(Result):
     @cached_property
     def margins(self) -> dict[str, float]:
         """The least value of each of the model's margins; a negative one is passed, see `MarginKind` (errata 20, 21)."""
-        least = self._extremes[:, at.LEAST_MARGIN :].min(axis=0)
+        least = self._extremes[:, SegmentColumn.LEAST_MARGIN :].min(axis=0)
         return dict(zip(self.problem.margins, map(float, least), strict=False))
 
     @cached_property

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from saltus.continuation import STEPS, Corrected, EquationCurve, Point
-from saltus.flow import segments as at
+from saltus.flow import SegmentValue
 from saltus.orbits.newton import Solution
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import Equations, Problem
@@ -127,7 +127,7 @@ def _seen_from(a: OrbitPoint, b: OrbitPoint) -> OrbitPoint:
     unknowns alone, not in the orbit.
     """
     own = a.curve.problem.own
-    first, second = (point.equations.ends[0, at.KINDS + 3 * own :] for point in (a, b))
+    first, second = (point.equations.ends[0, SegmentValue.FIRST_STATE + 3 * own :] for point in (a, b))
     if own > 1 or second[1] == 0.0:
         return b
     tangent = b.tangent.copy()

@@ -9,8 +9,8 @@ are
 
 which are regular also at v_i = 0, where the signature changes. The unknowns of an orbit without impacts are its state at phase 0,
 and the equation says that the state a period later is the same. Orbits of a system whose contact is no singularity
-(`flow/regularity.py`) have this equation too, whatever sides they pass through; grazing is then nothing special. The equations of
-a symmetric orbit cover half a period, after which it is its mirror image.
+(`flow/one_contact/regularity.py`) have this equation too, whatever sides they pass through; grazing is then nothing special.
+The equations of a symmetric orbit cover half a period, after which it is its mirror image.
 """
 
 from __future__ import annotations
@@ -23,8 +23,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from saltus.errors import ParameterError
-from saltus.flow import STRUCTURE_SIZES, ContactRegularity, Where, contact_regularity, load_segments, program, taylor_order
-from saltus.flow import segments as at
+from saltus.flow import (
+    STRUCTURE_SIZES,
+    ContactRegularity,
+    SegmentColumn,
+    SegmentValue,
+    Where,
+    contact_regularity,
+    load_segments,
+    program,
+    taylor_order,
+)
 from saltus.orbits.signature import Signature
 from saltus.systems import System, contact_images, numbers
 from saltus.taylor import FREQUENCY, record_table
@@ -256,7 +265,7 @@ class Problem:
         frequency = self.frequency(values)
         spans, sides = np.array([[begin / frequency, end / frequency, 0.0]]), np.array([[0, *self._along()]])
         followed = self.follow_segments(Segments(spans, sides, state.reshape(1, -1)), values)
-        return None if followed is None else followed.ends[0, at.KINDS : at.KINDS + 2 * self.own]
+        return None if followed is None else followed.ends[0, SegmentValue.FIRST_STATE : SegmentValue.FIRST_STATE + 2 * self.own]
 
     def follow_segments(self, segments: Segments, values: np.ndarray, with_extremes: bool = False) -> FollowedSegments | None:
         """The smooth motion along segments, with its extremes if asked for; None where a segment cannot be followed."""
@@ -264,8 +273,8 @@ class Problem:
         parameters[self._places] = values
         env, model = self._run.structure.prepare(parameters, self._records)
         n, own = len(segments.spans), self.own
-        ends, columns = np.zeros((n, at.KINDS + 6 * own)), np.zeros((n, 4 * own, self._where[Where.COLUMNS]))
-        extremes = np.zeros((n if with_extremes else 0, at.LEAST_MARGIN + max(1, self._where[Where.MARGINS])))
+        ends, columns = np.zeros((n, SegmentValue.FIRST_STATE + 6 * own)), np.zeros((n, 4 * own, self._where[Where.COLUMNS]))
+        extremes = np.zeros((n if with_extremes else 0, SegmentColumn.LEAST_MARGIN + max(1, self._where[Where.MARGINS])))
         done = load_segments()[0](self._where, self._settings, env, model, *segments, ends, columns, extremes)
         return None if done < n else FollowedSegments(ends, columns, extremes, np.sign(model[4][1:]))
 
@@ -300,8 +309,8 @@ class Problem:
     def _shooting(self, later: np.ndarray, frequency: float, followed: FollowedSegments) -> Equations:
         own, sign = self.own, -1.0 if self.signature.symmetric else 1.0
         ends, columns, extremes, _ = followed
-        state = ends[0, at.KINDS : at.KINDS + 2 * own]
-        rates = ends[0, at.KINDS + own : at.KINDS + 3 * own]
+        state = ends[0, SegmentValue.FIRST_STATE : SegmentValue.FIRST_STATE + 2 * own]
+        rates = ends[0, SegmentValue.FIRST_STATE + own : SegmentValue.FIRST_STATE + 3 * own]
         parameters = sign * columns[0, : 2 * own, 2 * own :]
         if FREQUENCY in self.paths:
             parameters[:, self.paths.index(FREQUENCY)] -= sign * rates * self.closing / frequency**2

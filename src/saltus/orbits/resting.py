@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow import EventKind, Motion, Release, load_releases, peak_near, simulate
-from saltus.flow import segments as at
+from saltus.flow import EventKind, Motion, Release, SegmentValue, load_releases, peak_near, simulate
 from saltus.orbits.newton import Solution
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.problem import ORBIT_TOLERANCE, Equations, Problem, Segments
@@ -259,8 +258,10 @@ def _between(problem: Problem, motion: Motion, excursions: np.ndarray) -> tuple[
         return None, np.empty(0)
     ends, _, extremes, rates = followed
     sign = np.where(along > 0, rates[0], rates[-1])
-    closed = np.stack([ends[:, at.KINDS] - contact, -sign * ends[:, at.KINDS + 1] - speeds], axis=1)
+    closed = np.stack(
+        [ends[:, SegmentValue.FIRST_STATE] - contact, -sign * ends[:, SegmentValue.FIRST_STATE + 1] - speeds], axis=1
+    )
     nothing = np.empty((0, 2, 2))
     equations = Equations(closed.ravel(), nothing, nothing, np.empty((0, len(problem.paths))), ends, extremes)
-    bends: np.ndarray = sign * ends[:, at.KINDS + 2]
+    bends: np.ndarray = sign * ends[:, SegmentValue.FIRST_STATE + 2]
     return equations, bends

@@ -20,7 +20,7 @@ impact leaves no speed). Contacts of one block that close together have a deriva
 Accumulations of impacts in several blocks that end at one instant are also treated one after the other. Their order makes no
 difference, as no speed is left. At a release nothing jumps, however many contacts open.
 
-Its compiled part goes into one module with that of `contacts_kernel.py`, whose docstring defines the arguments.
+Its compiled part goes into one module with that of `kernel.py`, whose docstring defines the arguments.
 """
 
 from __future__ import annotations
@@ -29,8 +29,9 @@ import math
 
 import numpy as np
 
-from saltus.flow.contacts.contact_choice import choose_closed
-from saltus.flow.contacts.contact_impacts import (
+from saltus.flow.contacts.choice import choose_closed
+from saltus.flow.contacts.frictions import hold_frictions
+from saltus.flow.contacts.impacts import (
     bring_to_rest,
     closed_bits,
     couple,
@@ -41,8 +42,9 @@ from saltus.flow.contacts.contact_impacts import (
     record_contact_event,
     settle_contact,
 )
-from saltus.flow.contacts.contact_layout import APART, ContactColumn, ImpactDetail, Solver
-from saltus.flow.contacts.contact_tangent import (
+from saltus.flow.contacts.layout import APART, ContactColumn, ImpactDetail, Solver
+from saltus.flow.contacts.solver_memory import copy_all
+from saltus.flow.contacts.tangent import (
     clear_shifts,
     closing_columns,
     fill_slopes,
@@ -55,11 +57,9 @@ from saltus.flow.contacts.contact_tangent import (
     rest_columns,
     slope,
 )
-from saltus.flow.contacts.frictions import hold_frictions
-from saltus.flow.contacts.solver_memory import copy_all
-from saltus.flow.kernel_layout import Status, Where, Work
-from saltus.flow.memory_layout import EventCode, State
-from saltus.flow.steps import expand, forget
+from saltus.flow.kernel.layout import Status, Where, Work
+from saltus.flow.kernel.memory_layout import EventCode, State
+from saltus.flow.kernel.steps import expand, forget
 from saltus.taylor import jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------

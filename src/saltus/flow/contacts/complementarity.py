@@ -1,13 +1,13 @@
 """Linear complementarity problems of a few contacts, solved by trying all sets of acting contacts.
 
-Its compiled part goes into one module with that of `contacts_kernel.py`.
+Its compiled part goes into one module with that of `kernel.py`.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from saltus.flow.contacts.contact_layout import VIOLATED
+from saltus.flow.contacts.layout import VIOLATED
 from saltus.taylor import lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------

@@ -6,19 +6,19 @@ The kernel's array of contacts has a row for each friction behind those of the c
 two guards, its margins (`stick_margins`). The directions are kept in the parameters of `env`, before the numbers that say which
 coordinates are free.
 
-Its compiled part goes into one module with that of `contacts_kernel.py`, whose docstring defines the arguments.
+Its compiled part goes into one module with that of `kernel.py`, whose docstring defines the arguments.
 """
 
 from __future__ import annotations
 
 from saltus.flow.contacts.complementarity import eliminate
-from saltus.flow.contacts.contact_impacts import record_contact_event
-from saltus.flow.contacts.contact_layout import ContactPart, FrictionColumn, Solver
-from saltus.flow.contacts.contact_tangent import move_columns, note_shifts, slope
-from saltus.flow.kernel_layout import EXACT, ZERO, Mode, Setting, Where, Work
-from saltus.flow.memory_layout import EventCode, State
-from saltus.flow.roots import NEVER, SIMPLE, contact_root, leading
-from saltus.flow.steps import expand, step_size
+from saltus.flow.contacts.impacts import record_contact_event
+from saltus.flow.contacts.layout import ContactPart, FrictionColumn, Solver
+from saltus.flow.contacts.tangent import move_columns, note_shifts, slope
+from saltus.flow.kernel.layout import EXACT, ZERO, Mode, Setting, Where, Work
+from saltus.flow.kernel.memory_layout import EventCode, State
+from saltus.flow.kernel.roots import NEVER, SIMPLE, contact_root, leading
+from saltus.flow.kernel.steps import expand, step_size
 from saltus.taylor import lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------

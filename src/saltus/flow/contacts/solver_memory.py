@@ -1,6 +1,6 @@
 """The arrays in which impacts and closed contacts are solved for.
 
-Its compiled part goes into one module with that of `contacts_kernel.py`.
+Its compiled part goes into one module with that of `kernel.py`.
 """
 
 from __future__ import annotations

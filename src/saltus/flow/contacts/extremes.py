@@ -1,0 +1,132 @@
+"""The extremes along a smooth segment of a motion with several contacts, in the places of `SegmentExtremes`.
+
+Its compiled part goes into one module with that of `segments.py`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from saltus.flow.contacts.impacts import contact_position, gap_series
+from saltus.flow.contacts.layout import ContactColumn, ContactPart, SegmentEnd, SegmentExtremes, SegmentPlan, Solver
+from saltus.flow.kernel.layout import Where, Work
+from saltus.flow.kernel.memory_layout import EventCode, State
+from saltus.flow.kernel.roots import NOISE, horner, roots_within, scale_gap
+from saltus.taylor import lean_jit
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+AT_REST = 1e-9  # the speed below which a contact opens from rest after an impact without restitution
+HARDLY_OPEN = 1e-3  # a time in which a gap hardly opens
+ENDS = 1e-6  # share of a segment at both of its ends in which no extremum is looked for: guards are 0 there
+
+
+@lean_jit
+def least_of(c, order, h, t, poly, roots, seen, place):
+    """Update the least inner minimum at `place` of `seen`, and its time, with the minima of a series within a step."""
+    size = abs(c[0])
+    for k in range(1, order + 1):
+        poly[k - 1] = k * c[k] * h**k
+        size += abs(c[k] * h**k)
+    for i in range(roots_within(poly, order - 1, roots, NOISE * size)):
+        turn, value = 0.0, horner(c, order, roots[i] * h)
+        for k in range(order - 1, 0, -1):
+            turn = turn * roots[i] + k * poly[k]
+        if turn > 0.0 and value < seen[place]:
+            seen[place], seen[place + 1] = value, t + roots[i] * h
+
+
+@lean_jit
+def extremes_at_step(where, state, model, contacts, work, solver, t, h, begin, end, roots, seen, least):
+    """Update the extremes with a step: extrema of the coordinates, inner minima of the guards, least values of the margins."""
+    order, own, count, poly = where[Where.ORDER], where[Where.OWN], contacts.shape[0], work[Work.POLYNOMIAL]
+    for a in range(own):
+        q, size = work[Work.POSITIONS][a], 0.0
+        scale_gap(work[Work.VELOCITIES][a], 0, order, h, poly)
+        for k in range(order + 1):
+            size += abs(poly[k])
+        for i in range(roots_within(poly, order, roots, NOISE * size) + 2):
+            u = 0.0 if i == 0 else 1.0 if i == 1 else roots[i - 2]
+            x = horner(q, order, u * h)
+            seen[SegmentExtremes.TOP] = max(seen[SegmentExtremes.TOP], x)
+            seen[SegmentExtremes.BOTTOM] = min(seen[SegmentExtremes.BOTTOM], x)
+    for i in range(count):
+        guard = work[Work.GAP]
+        if contacts[i, ContactColumn.CLOSED] == 1:
+            guard = work[Work.MARGINS][i]
+        else:
+            gap_series(model, contacts, work, i, contact_position(solver, own, count, i), order, guard)
+        least[0], least[1] = np.inf, 0.0
+        least_of(guard, order, h, t, poly, roots, least, 0)
+        place = SegmentExtremes.FORCE if contacts[i, ContactColumn.CLOSED] == 1 else SegmentExtremes.GAP
+        inside = ENDS * (end - begin) < least[1] - begin < (1.0 - ENDS) * (end - begin)
+        if inside and least[0] < seen[place]:
+            seen[place], seen[place + 1], seen[place + 2] = least[0], least[1], i
+    for j in range(count, where[Where.MARGINS]):
+        place, m = SegmentExtremes.MARGINS + j - count, work[Work.MARGINS][j]
+        least[0] = min(m[0], horner(m, order, h))
+        least_of(m, order, h, t, poly, roots, least, 0)
+        seen[place] = min(seen[place], least[0])
+
+
+@lean_jit
+def extremes_at_start(where, state, model, contacts, work, solver, hit, seen):
+    """Begin the extremes of a segment: `PULL` is the least of the reactions of closed contacts and of the acceleration with which
+    the contact `hit` opens, if it opens from rest."""
+    for k in range(seen.size):
+        seen[k] = np.inf
+    seen[SegmentExtremes.TOP] = -np.inf
+    for i in range(contacts.shape[0]):
+        pull, coordinate = np.inf, contacts[i, ContactColumn.COORDINATE]
+        if contacts[i, ContactColumn.CLOSED] == 1:
+            pull = work[Work.MARGINS][i, 0]
+        elif i == hit and abs(state[State.COORDINATES + where[Where.DOF] + coordinate]) < AT_REST:
+            pull = model[ContactPart.SIGNS][i] * work[Work.ACCELERATIONS][coordinate, 0]
+        if pull < seen[SegmentExtremes.PULL]:
+            seen[SegmentExtremes.PULL], seen[SegmentExtremes.PULL + 1] = pull, i
+
+
+@lean_jit
+def extremes_at_section(where, state, model, contacts, work, solver, t, seen):
+    """Update the extremes with the guards at the start of a segment without event there: a minimum may lie just at its start."""
+    own, count = where[Where.OWN], contacts.shape[0]
+    for i in range(count):
+        closed, x = contacts[i, ContactColumn.CLOSED] == 1, state[State.COORDINATES + contacts[i, ContactColumn.COORDINATE]]
+        gap = model[ContactPart.SIGNS][i] * (x - contact_position(solver, own, count, i))
+        value, place = work[Work.MARGINS][i, 0] if closed else gap, SegmentExtremes.FORCE if closed else SegmentExtremes.GAP
+        if value < seen[place]:
+            seen[place], seen[place + 1], seen[place + 2] = value, t, i
+
+
+@lean_jit
+def extremes_at_end(work, contacts, released, seen):
+    """Update `TAIL`, the least reaction at the end of a segment of all closed contacts but the one that is released there."""
+    for i in range(contacts.shape[0]):
+        reaction = work[Work.MARGINS][i, 0]
+        if contacts[i, ContactColumn.CLOSED] == 1 and i != released and reaction < seen[SegmentExtremes.TAIL]:
+            seen[SegmentExtremes.TAIL], seen[SegmentExtremes.TAIL + 1] = reaction, i
+
+
+@lean_jit
+def gap_beside(where, model, contacts, solver, plan, s, duration, ends, seen):
+    """Update `BESIDE`, the least gap at the impact with which segment s of the plan ends, of another contact whose speed the
+    impact changes.
+
+    Such a gap may have its minimum at the impact, which no smooth segment shows. A gap that has opened at the start of the
+    segment is divided by the power of the duration with which it grows; very short segments are skipped, where only rounding
+    would be left.
+    """
+    own, count, hit = where[Where.OWN], contacts.shape[0], plan[s, SegmentPlan.CONTACT]
+    released = plan[s - 1, SegmentPlan.KIND] == EventCode.RELEASE
+    for i in range(count):
+        if i == hit or plan[s, SegmentPlan.ALONG] >> i & 1 or solver[Solver.COUPLING][i, hit] == 0.0:
+            continue
+        sign, place = model[ContactPart.SIGNS][i], SegmentEnd.NUMBERS + contacts[i, ContactColumn.COORDINATE]
+        position = contact_position(solver, own, count, i)
+        gap = sign * (ends[place + 4 * own] - position)
+        if sign * (ends[place] - position) < AT_REST:
+            if not duration > HARDLY_OPEN:
+                continue
+            power = 1 if abs(ends[place + own]) >= AT_REST else 3 if released else 2
+            gap /= duration**power
+        seen[SegmentExtremes.BESIDE] = min(seen[SegmentExtremes.BESIDE], gap)

@@ -1,0 +1,118 @@
+"""Places in the arrays that the kernel for several contacts shares with its callers, and its thresholds."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class ContactColumn(IntEnum):
+    """Columns of the array `contacts` of whole numbers, with a row for each contact."""
+
+    COORDINATE = 0  # the coordinate that it holds
+    CLOSED = 1  # 1 if it is closed: its gap and the gap's rate are then exactly 0
+    SKIP = 2  # how many of the first Taylor coefficients of its guard are known to be 0 at the start of a step
+    RELEASED = 3  # 1 if its reaction has just fallen to 0, and is known to be 0
+    WAITS = 4  # after how many more of its impacts the end of an accumulation is looked for again
+
+
+class FrictionColumn(IntEnum):
+    """Columns of the rows behind those of the contacts, one row for each friction."""
+
+    COORDINATE = 0  # the coordinate along which it acts
+    SLIDES = 1  # the direction in which it slides, +1 or -1; 0 if it sticks
+    SKIP = 2  # how many of the first Taylor coefficients of its guard are known to be 0 at the start of a step
+    MARGIN = 3  # if it sticks, the number of the margin that SKIP refers to
+    REACHED = 4  # 1 or 2: this margin has just reached 0; 3: the sliding speed has
+
+
+class ContactPart(IntEnum):
+    """Places in the tuple `model`: the functions of a structure that the kernel calls, and the signs of the contacts."""
+
+    SERIES = 0
+    MATRICES = 1
+    SIGNS = 2
+    SLOPES = 3  # the derivatives, along each column of the tangent, of the numbers that `MATRICES` fills
+    TANGENT = 4
+
+
+class Solver(IntEnum):
+    """Places in the tuple `solver` of arrays, in which impacts and closed contacts are solved for."""
+
+    NUMBERS = 0  # filled by `MATRICES`: mass matrix by rows, E by rows, positions, speeds of the frictions' grounds
+    INVERSE = 1  # of the mass matrix
+    COUPLING = 2  # the rates that unit impulses of the contacts give to the gaps, signs included
+    BLOCK = 3  # the rows of a linear system, with its right-hand sides behind them
+    REDUCED = 4  # the coupling of some of the contacts
+    RIGHT = 5
+    IMPULSES = 6
+    TRIED = 7
+    RATES = 8  # of the gaps before an impact
+    GAPS = 9
+    PULLS = 10  # the second derivatives of the gaps with no contact closed
+    FALLING_GAPS = 11  # while an accumulation is followed
+    FALLING_RATES = 12
+    FALLING_PULLS = 13
+    SLOPES = 14  # a row for each column of the tangent: the derivatives of `NUMBERS`
+    JUMP = 15  # of the velocities at an impact
+    EVENT_SHIFTS = 16  # by how much an impact, a release or the end of an accumulation moves with each column
+    PULL_SLOPES = 17  # the derivatives of `PULLS`, a row for each column
+
+
+class SegmentPlan(IntEnum):
+    """Columns of the plan that describes each segment of an orbit (`segments.py`)."""
+
+    ALONG = 0  # the contacts that are closed along the segment, as bits
+    KIND = 1  # the kind of the event with which it ends: IMPACT or RELEASE of `EventCode`, -1 for none
+    CONTACT = 2  # the contact of that event
+    AFTER = 3  # the contacts that are closed after it, as bits
+    POWER = 4  # its guard is divided by this power of its duration: 3 or 2 for excursions (`excursion_guard`), else 0
+    HIT = 5  # the contact whose impact begins it, -1 for none
+
+
+class SegmentEnd(IntEnum):
+    """Places in the numbers that describe a segment's ends."""
+
+    GUARD = 0  # the guard of its event: the gap, or the reaction
+    RATE = 1  # the guard's rate; at an impact minus the speed
+    BY_START = 2  # the guard's derivative to the time of the segment's start
+    BY_END = 3  # the guard's derivative to the time of its end
+    NUMBERS = 4  # state and rates at the start, both at the end, the state after the event: 10 numbers for each coordinate
+
+
+class SegmentExtremes(IntEnum):
+    """Places in the extremes along a segment; inf where there is no such minimum."""
+
+    TOP = 0  # the largest value of any coordinate
+    BOTTOM = 1  # the least value of any coordinate
+    GAP = 2  # the lowest inner minimum of a gap, its time, and its contact
+    FORCE = 5  # the lowest inner minimum of a reaction, its time, and its contact
+    PULL = 8  # at the start, the least reaction of a closed contact or acceleration of an opening one, and its contact
+    TAIL = 10  # at the end, the least reaction of a contact that stays closed up to the event, and its contact
+    BESIDE = 12  # at an impact that ends it, the least gap of another contact whose speed the impact changes
+    MARGINS = 13  # the least values of the margins, from here on
+
+
+class ImpactDetail(IntEnum):
+    """Whether the motion has derivatives after an impact, or why it has none."""
+
+    REGULAR = 0
+    NO_SPEED = 1  # a contact is reached without speed
+    APART = 2  # contacts that act on one another close at one instant, and in neighbouring motions one after the other
+    ORDERED = 3  # contacts that do not act on one another close at one instant, and their order makes a first-order difference
+
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+NEAR = (
+    2.0**-44
+)  # Contacts close together if, when one closes, the other's gap is no larger than this share of its size in the step.
+GAP_ROUNDING = 2.0**-6  # The rounding of a gap, in units of NEAR times the contact's position.
+VIOLATED = 1e-12  # The largest violation of a complementarity problem that may be rounding, as a share of its right-hand side.
+MOST_FROZEN_IMPACTS = 100_000  # Impacts of an accumulation that are followed at most: e = 0.9996 needs so many for 16 digits.
+APART = 1e-9  # Contacts close together in neighbouring motions too if their shifts differ by less than this share.
+RELATIVE_STEP = 1e-4  # of the differences of an accumulation's duration: their error is its square, and 1e-12 by rounding
+VANISHED = 1e-16  # A contact whose impacts are slower than the first one of an accumulation by this factor rests.
+FINISHED = 1e-14  # An accumulation is over if all speeds are smaller than the first one by this factor. It exceeds VANISHED, at
+# which accumulations of one contact within those of another are cut off: near that scale the cuts would keep the other one going.
+TRIED_AGAIN = 32  # If n impacts were followed ahead in vain, n / 32 impacts must happen before it is tried again.
+TIED = 1e-12  # Reactions smaller than this vanish together: the rounding of the loads that hold the contacts.

@@ -1,0 +1,305 @@
+"""The compiled code with which one motion is followed: one kernel for all models, and the functions of each structure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache, cached_property
+from types import ModuleType
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from saltus.flow.contacts import choice, closings, complementarity, decisions, extremes, frictions, solver_memory, tangent
+from saltus.flow.contacts import impacts as contact_impacts
+from saltus.flow.contacts import kernel as contacts_kernel
+from saltus.flow.contacts import layout as contact_layout
+from saltus.flow.contacts import segments as contact_segments
+from saltus.flow.contacts.one_free import OneFree, equations_of_one_free
+from saltus.flow.kernel import event_derivatives, function_types, layout, roots, steps
+from saltus.flow.kernel.memory_layout import State
+from saltus.flow.one_contact import chatter, impacts, kernel, segments, sides
+from saltus.taylor import (
+    Case,
+    Expr,
+    Places,
+    Rows,
+    Trace,
+    compiled_part,
+    digest,
+    entry_point,
+    function_text,
+    generated_header,
+    is_steep,
+    load_module,
+    number,
+    pointer,
+    shared_constants,
+    source_of,
+    substitute,
+    tape,
+)
+
+MOST_COEFFICIENTS = 24  # length of a series at the tightest tolerance: order 21, hence 23 coefficients, rounded up to pairs
+_SIGNATURES = f"""import math
+
+import numpy as np
+
+from saltus.flow.kernel.function_types import *
+from saltus.taylor.private_numba import cached_jit, inline_jit, jit, lean_jit
+from saltus.taylor.references import by_reference
+# types of {digest(source_of(function_types))}
+"""
+ENV = {"parameter": ("parameters", 0), "constant": ("constants", 0), "record": ("table", 0)}
+LEAVES = ENV | {"time": ("t", 0), "origin": ("origin", 0), "side": ("side", 0)}
+HERE = {"coordinate": ("state", State.COORDINATES.value)}  # in the kernel's state
+
+
+@dataclass(frozen=True)
+class Structure:
+    """The compiled functions of a traced structure, and its sizes."""
+
+    module: ModuleType
+    # The functions that the kernel calls: series, contact_series, reset, contact_damping, tangent; with several contacts series,
+    # matrices, matrix_slopes, tangent.
+    functions: tuple[Any, ...]
+    constants: Callable[..., None]
+    geometry: Callable[..., None] | None  # of a model with one contact; None with several
+    signs: tuple[int, ...] = ()  # of the contacts, if there are several
+    frictions: int = 0
+
+    def prepare(self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+        """The arguments `env` and `model` of the kernel for given numbers (see `one_contact/kernel.py`)."""
+        constants, geometry = np.zeros(self.module.CONSTANT_COUNT), np.zeros(3)
+        self.constants(parameters, constants)
+        if self.geometry is None:
+            modes = np.append(np.zeros(self.frictions), np.ones(self.module.OWN))
+            env = (np.append(parameters, modes), constants, *records)
+            return env, (*self.functions[:2], np.array(self.signs, dtype=float), *self.functions[2:])
+        env = (parameters, constants, *records)
+        self.geometry(env, geometry)
+        return env, (*self.functions[:4], geometry, self.functions[4])
+
+    @cached_property
+    def tables(self) -> tuple[Any, ...]:
+        """Pointers to `constants` and to `geometry` (with several contacts `matrices`), which the lanes' driver calls."""
+        return tuple(
+            pointer(getattr(self.module, name)) for name in ("constants", "matrices" if self.geometry is None else "geometry")
+        )
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """The numbers of coordinates with the tangent's, margins, rows of the workspace and sides; whether steps are checked; and
+        the numbers of the model's own coordinates and of columns of the tangent."""
+        return tuple(getattr(self.module, name) for name in ("DOF", "STOPS", "ROWS", "SIDES", "STEEP", "OWN", "COLUMNS"))
+
+
+@cache
+def load_kernel() -> Callable[..., int]:
+    """The kernel that advances every model, `advance` of `one_contact/kernel.py`, called without numba's dispatch on argument
+    types."""
+    return entry_point(kernel_module().advance)
+
+
+def kernel_module() -> ModuleType:
+    """The module of the scalar kernel."""
+    return load_module("kernel", _text(layout, roots, steps, impacts, chatter, kernel))
+
+
+@cache
+def load_contacts_kernel() -> Callable[..., int]:
+    """The kernel for models with several contacts, `advance_contacts` of `contacts/kernel.py`."""
+    return entry_point(contacts_module().advance_contacts)
+
+
+def contacts_module() -> ModuleType:
+    """The module of the scalar kernel for models with several contacts."""
+    parts = (
+        contact_layout,
+        solver_memory,
+        complementarity,
+        contact_impacts,
+        tangent,
+        frictions,
+        choice,
+        closings,
+    )
+    return load_module("contacts", _text(layout, roots, steps, *parts, decisions, contacts_kernel))
+
+
+@cache
+def load_segments() -> tuple[Callable[..., int], Callable[..., None]]:
+    """The functions with which periodic orbits are solved: `follow_segments` and `impact_equations` of
+    `one_contact/segments.py`."""
+    module = load_module("segments", _text(layout, roots, steps, impacts, sides, chatter, segments))
+    return entry_point(module.follow_segments), entry_point(module.impact_equations)
+
+
+@cache
+def load_contact_segments() -> Callable[..., int]:
+    """The function with which orbits with several contacts are solved, `follow_contact_segments` of `contacts/segments.py`."""
+    parts = (contact_layout, solver_memory, complementarity, contact_impacts, tangent, extremes, contact_segments)
+    return entry_point(load_module("contact_segments", _text(layout, roots, steps, *parts)).follow_contact_segments)
+
+
+def _text(*modules: ModuleType) -> str:
+    """One source of the compiled parts of several files."""
+    return _SIGNATURES + "".join(compiled_part(module) for module in modules)
+
+
+def load_structure(trace: Trace) -> Structure:
+    """The functions of a trace's structure."""
+    module = load_module("structure", generated_header(_SIGNATURES) + structure_text(trace))
+    several = ("series", "matrices", "matrix_slopes", "tangent")
+    names = several if trace.several else ("series", "contact_series", "reset", "contact_damping", "tangent")
+    return Structure(
+        module,
+        tuple(pointer(getattr(module, name)) for name in names),
+        entry_point(module.constants),
+        None if trace.several else entry_point(module.geometry),
+        trace.signs,
+        len(trace.rubbed),
+    )
+
+
+# --- the functions of a structure ------------------------------------------------------------------------------------------
+
+
+def structure_text(trace: Trace) -> str:
+    """The source of a structure's functions; equal structures have equal sources, whatever their numbers."""
+    known = constants(trace)
+    sizes = {
+        "DOF": len(trace.acceleration),
+        "OWN": trace.dof,
+        "COLUMNS": trace.columns,
+        "STOPS": len(trace.reactions) + len(trace.margins),
+        "ROWS": 1,
+        "SIDES": trace.sides,
+        "STEEP": int(is_steep(trace.acceleration)),
+        "CONSTANT_COUNT": max(1, len(known)),
+    }
+    impact = [x for x in (trace.next_side, trace.velocity_after) if x is not None] or [number(0.0)] * 2
+    damping = [number(0.0) if trace.contact_damping is None else trace.contact_damping]
+    instant = ("side", "env", "piece")
+    functions = [_series(trace, known), _table("constants", Places(("parameters", "constants"), ENV), list(known), {})]
+    if trace.several:
+        return _source(sizes, [*functions, _matrices(trace, known), _matrix_slopes(trace, known), _tangent(trace, known)])
+    functions += [
+        _contact_series(trace, known),
+        _at_impact("reset", ("t", "origin", "v0", *instant), impact, known),
+        _at_impact("contact_damping", ("t", "origin", *instant), damping, known),
+        _tangent(trace, known),
+        _table("geometry", Places(("env", "out"), ENV), _geometry(trace), known),
+    ]
+    return _source(sizes, functions)
+
+
+def _source(sizes: dict[str, int], functions: list[str]) -> str:
+    return "\n".join([*(f"{name} = {value!r}" for name, value in sizes.items()), "", *functions])
+
+
+def constants(trace: Trace) -> dict[Expr, int]:
+    """The table of constants: the parts of a structure's expressions that depend on parameters alone, with their places."""
+    roots = [*trace.acceleration, *motion_roots(trace), *_geometry(trace), *trace.contact_numbers]
+    roots += [
+        x for x in (trace.contact_acceleration, trace.next_side, trace.velocity_after, trace.contact_damping) if x is not None
+    ]
+    for _, _, changes in event_derivatives.changes(trace) if trace.columns else []:
+        roots += changes.values()
+    roots += event_derivatives.number_slopes(trace)
+    equations = one_free(trace)
+    roots += equations.roots if equations else []
+    return shared_constants(roots)
+
+
+def motion_roots(trace: Trace) -> list[Expr]:
+    """Gap, reactions and margins of a trace, with the accelerations substituted: their series are computed with the motion's."""
+    accelerations = {Expr("acceleration", (), i): a for i, a in enumerate(trace.acceleration[: trace.dof])}
+    return [
+        *([] if trace.gap is None else [trace.gap]),
+        *(substitute(root, accelerations) for root in (*trace.reactions, *trace.margins.values())),
+    ]
+
+
+def one_free(trace: Trace) -> OneFree | None:
+    """The equations of motion of a trace with several contacts while one coordinate is free; None if it has none."""
+    if trace not in _one_free:
+        _one_free[trace] = equations_of_one_free(trace, motion_roots(trace)[len(trace.reactions) :])
+    return _one_free[trace]
+
+
+_one_free: WeakKeyDictionary[Trace, OneFree | None] = WeakKeyDictionary()
+
+
+def _geometry(trace: Trace) -> list[Expr]:
+    """The coordinate at contact and the gap's rate there on both sides."""
+    if trace.contact is None or trace.gap_rate is None:
+        return []
+    return [trace.contact, *(substitute(trace.gap_rate, {Expr("side"): side}) for side in (1.0, -1.0))]
+
+
+def _series(trace: Trace, known: dict[Expr, int]) -> str:
+    """The Taylor coefficients of the coordinates, velocities, accelerations, the gap and the margins from one state."""
+    rows = range(len(trace.acceleration))
+    gap = [] if trace.gap is None else [("g", 0)]
+    targets = [*(("a", i) for i in rows), *gap, *(("m", j) for j in range(len(trace.reactions) + len(trace.margins)))]
+    leaves = LEAVES | _free(trace)
+    places = Places(("t", "origin", "side", "env", "piece", "q", "v", "a", "g", "m", "w", "order"), leaves)
+    layout = Rows([("q", i) for i in rows], [("v", i) for i in rows], targets, MOST_COEFFICIENTS, any_order=True)
+    motion = tape([*trace.acceleration, *motion_roots(trace)], known, series=True)
+    return function_text("series", places, "SCALAR", [layout, motion])
+
+
+def _free(trace: Trace) -> dict[str, tuple[str, int]]:
+    """The places behind the parameters that hold in which direction each friction slides, and whether each coordinate is free."""
+    first = len(trace.parameters)
+    return {"slide": ("parameters", first), "free": ("parameters", first + len(trace.rubbed))}
+
+
+def _contact_series(trace: Trace, known: dict[Expr, int]) -> str:
+    """The Taylor coefficients in the time of the gap's second derivative at rest at contact."""
+    places = Places(("t", "origin", "side", "env", "piece", "b", "w", "order"), LEAVES)
+    if trace.contact_acceleration is None:
+        return function_text("contact_series", places, "SCALAR", [])
+    layout = Rows([], [], [("b", 0)], MOST_COEFFICIENTS, any_order=True)
+    return function_text("contact_series", places, "SCALAR", [layout, tape([trace.contact_acceleration], known, series=True)])
+
+
+def _matrices(trace: Trace, known: dict[Expr, int]) -> str:
+    """The mass matrix, E, the positions of the contacts and the speeds of the grounds at a state, one after the other."""
+    roots = trace.contact_numbers
+    places = Places(("env", "piece", "state", "out"), ENV | HERE)
+    return function_text("matrices", places, "SCALAR", [Case(tape(roots, known), [("out", i) for i in range(len(roots))])])
+
+
+def _matrix_slopes(trace: Trace, known: dict[Expr, int]) -> str:
+    """The derivatives, along each column of the tangent, of the numbers that `matrices` fills; one column after the other."""
+    roots, places = event_derivatives.number_slopes(trace), Places(("env", "piece", "state", "out"), ENV | HERE)
+    cases = [Case(tape(roots, known), [("out", i) for i in range(len(roots))])] if roots else []
+    return function_text("matrix_slopes", places, "SCALAR", cases)
+
+
+def _at_impact(name: str, arguments: tuple[str, ...], roots: list[Expr], known: dict[Expr, int]) -> str:
+    """A function that returns the values of expressions at an instant, for the velocity `v0`."""
+    places = Places(arguments, LEAVES | {"velocity": ("v0", 0)})
+    return function_text(name, places, "SCALAR", [Case(tape(roots, known), [None] * len(roots))])
+
+
+def _tangent(trace: Trace, known: dict[Expr, int]) -> str:
+    """The function that transforms the tangent's columns, in the kernel's state (see `State`), at each kind of event."""
+    count, first = len(trace.acceleration), State.COORDINATES.value
+    starts = {"coordinate": first, "velocity": first + count, "shift": first + 2 * count}
+    state = {op: ("state", start) for op, start in starts.items()}
+    cases = []
+    for kind, detail, changes in event_derivatives.changes(trace) if trace.columns else []:
+        targets = [("state", starts[leaf.op] + leaf.value) for leaf in changes]
+        cases.append(Case(tape(list(changes.values()), known), targets, (("kind", int(kind)), ("detail", int(detail)))))
+    places = Places(("kind", "detail", "t", "origin", "side", "env", "piece", "state"), LEAVES | _free(trace) | state)
+    return function_text("tangent", places, "SCALAR", cases)
+
+
+def _table(name: str, places: Places, roots: list[Expr], known: dict[Expr, int]) -> str:
+    """A function that fills its last argument with the values of expressions of the parameters."""
+    targets = [(places.arguments[-1], i) for i in range(len(roots))]
+    return function_text(name, places, "SCALAR", [Case(tape(roots, known), targets)], python=True)

@@ -1,0 +1,203 @@
+"""The saltation of the tangent's columns at the events of a motion, and the shift of each event, as expressions of a trace.
+
+A column holds the derivatives to a number c, an initial value or a parameter. The shift dt is the derivative of an event's time
+to c; at the event the column jumps.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
+from saltus.flow.kernel.memory_layout import EventCode, ReleaseDetail, RestDetail
+from saltus.taylor import (
+    Expr,
+    Trace,
+    derivative_along,
+    differentiate,
+    number,
+    partial_derivative,
+    substitute,
+    tangent_leaves,
+    time_derivative,
+)
+
+NONE = number(math.nan)
+
+
+@dataclass(frozen=True)
+class Saltation:
+    """The tangent after an impact, one expression for each column.
+
+    The leaves of these expressions are the tangent's coordinates and velocities before the impact, the model's own velocity v-
+    before it (as velocity 0), the time, the origin, the side before the impact and the parameters.
+    """
+
+    coordinate: list[Expr]  # u+
+    velocity: list[Expr]  # z+
+    shift: list[Expr]  # dt, of the impact's time
+
+
+def changes(trace: Trace) -> list[tuple[EventCode, int, dict[Expr, Expr]]]:
+    """For every event that the structure can have: its kind, its detail, and the new expressions of the tangent's leaves.
+
+    The leaf "shift" of a column is the shift of the event.
+    """
+    if trace not in _changes:
+        _changes[trace] = _derive_changes(trace)
+    return _changes[trace]
+
+
+_changes: WeakKeyDictionary[Trace, list[tuple[EventCode, int, dict[Expr, Expr]]]] = WeakKeyDictionary()
+
+
+def _derive_changes(trace: Trace) -> list[tuple[EventCode, int, dict[Expr, Expr]]]:
+    """`changes`, derived once: several functions of a structure are written from them."""
+    events = [(EventCode.LIMIT, i, _shifts(margin_shift(trace, margin))) for i, margin in enumerate(trace.margins.values())]
+    events += [(EventCode.RELEASE, i, _shifts(reaction_slopes(trace, reaction))) for i, reaction in enumerate(trace.reactions)]
+    if trace.gap is None:
+        return events
+    jump = saltation(trace)
+    after, at_rest, none = _shifts(jump.shift), dict[Expr, Expr](), dict[Expr, Expr]()
+    for j in range(trace.columns):
+        (u,), (z,) = tangent_leaves(trace, j)
+        held = contact_shift(trace, j)
+        after |= {u: jump.coordinate[j], z: jump.velocity[j]}
+        at_rest |= {u: held, z: number(0.0)}
+        known = j >= 2 * trace.dof and held is number(0.0)
+        none |= {u: held if known else NONE, z: number(0.0) if known else NONE}
+    still, unknown = [number(0.0)] * trace.columns, [NONE] * trace.columns
+    return [
+        *events,
+        (EventCode.IMPACT, 0, after),
+        (EventCode.RESET_SLOPES, 0, _reset_slopes(trace)),
+        (EventCode.RESTING, RestDetail.AFTER_IMPACTS, at_rest | _shifts(rest_shift(trace))),
+        (EventCode.RESTING, RestDetail.AT_ONCE, at_rest),
+        (EventCode.RESTING, RestDetail.NEVER_AGAIN, none),
+        (EventCode.RELEASE, ReleaseDetail.AT_A_ROOT, _shifts(release_shift(trace))),
+        (EventCode.RELEASE, ReleaseDetail.AT_A_JUMP, _shifts(still)),
+        (EventCode.RELEASE, ReleaseDetail.AT_NONE, _shifts(unknown)),
+    ]
+
+
+def _reset_slopes(trace: Trace) -> dict[Expr, Expr]:
+    """The derivatives of the reset v+ = R(v-, t, c) at x(c) alone, at a fixed instant: u = x_c, z = R_v z + R_c, and R_t as the
+    shift."""
+    assert trace.velocity_after is not None
+    reset, places = trace.velocity_after, dict[Expr, Expr]()
+    slope, drift = differentiate(reset, Expr("velocity", (), 0)), time_derivative(trace, reset)
+    for j in range(trace.columns):
+        (u,), (z,) = tangent_leaves(trace, j)
+        places |= {u: contact_shift(trace, j), z: slope * z + partial_derivative(trace, reset, j)}
+    return places | _shifts([drift] * trace.columns)
+
+
+def _shifts(values: list[Expr]) -> dict[Expr, Expr]:
+    """The shift of each column, as a change of the state."""
+    return {Expr("shift", (), j): value for j, value in enumerate(values)}
+
+
+def saltation(trace: Trace) -> Saltation:
+    """The saltation of an impact, for a model with contact and a trace with columns.
+
+    With the gap g(q, c), the point of contact x(c) and the reset v+ = R(v-, t, c), everything one-sided at the impact:
+
+        dt = -(g_q u- + g_c) / (g_q v-),
+        u+ = x_c - v+ dt,
+        z+ = R_v (z- + a_old dt) + R_t dt + R_c - a_new dt.
+
+    For x_c = 0 the determinant of (u-, z-) -> (u+, z+) is R_v v+ / v-.
+    """
+    assert trace.gap is not None
+    assert trace.gap_rate is not None
+    assert trace.velocity_after is not None
+    assert trace.next_side is not None
+    before, reset = Expr("velocity", (), 0), trace.velocity_after
+    here = {Expr("coordinate", (), 0): trace.contact}
+    old = substitute(trace.acceleration[0], here)
+    new = substitute(trace.acceleration[0], here | {before: reset, Expr("side"): trace.next_side})
+    slope, drift = differentiate(reset, before), time_derivative(trace, reset)
+    result = Saltation([], [], [])
+    for j in range(trace.columns):
+        (u,), (z,) = tangent_leaves(trace, j)
+        shift = -(trace.gap_rate * u + substitute(partial_derivative(trace, trace.gap, j), here)) / (trace.gap_rate * before)
+        result.shift.append(shift)
+        result.coordinate.append(contact_shift(trace, j) - reset * shift)
+        result.velocity.append(slope * (z + old * shift) + (drift - new) * shift + partial_derivative(trace, reset, j))
+    return result
+
+
+def contact_shift(trace: Trace, j: int) -> Expr:
+    """The derivative x_c of the point of contact to column j's parameter. At rest there, u is x_c and z is 0."""
+    assert trace.contact is not None
+    return partial_derivative(trace, trace.contact, j)
+
+
+def release_shift(trace: Trace) -> list[Expr]:
+    """The shift dt = -b_c / b_t of a release from rest, where the contact acceleration b(t, c) of the side passes through 0.
+
+    Under constant loads, where b does not depend on t, it is nan.
+    """
+    pull = trace.contact_acceleration
+    assert pull is not None
+    slope = time_derivative(trace, pull)
+    if slope is number(0.0):
+        return [number(math.nan)] * trace.columns
+    return [-partial_derivative(trace, pull, j) / slope for j in range(trace.columns)]
+
+
+def rest_shift(trace: Trace) -> list[Expr]:
+    """The shift of the end of an accumulation of impacts, from the state just after one of them, on its side.
+
+    The shift of that impact is dt = (x_c - u) / v, and that of its speed dv = z + a dt. The time left is
+    R = 2 w (1/abs(b_s) + e1/abs(b_n)) / (1 - e1 e2), as in `contact.accumulation`. The shift of the rest is therefore
+    dt + R_v dv + R_t dt + R_c, with the error of R, which is of the order of R^2.
+    """
+    v, left = Expr("velocity", (), 0), time_left(trace)
+    acceleration = substitute(trace.acceleration[0], {Expr("coordinate", (), 0): trace.contact})
+    slope, drift, result = differentiate(left, v), time_derivative(trace, left), []
+    for j in range(trace.columns):
+        (u,), (z,) = tangent_leaves(trace, j)
+        shift = (contact_shift(trace, j) - u) / v
+        result.append(shift + slope * (z + acceleration * shift) + drift * shift + partial_derivative(trace, left, j))
+    return result
+
+
+def time_left(trace: Trace) -> Expr:
+    """The time R that is left until an accumulation of impacts ends, from the velocity just after one of them, on its side."""
+    pull, gap_rate, reset, turn = trace.contact_acceleration, trace.gap_rate, trace.velocity_after, trace.next_side
+    assert pull is not None
+    assert gap_rate is not None
+    assert reset is not None
+    assert turn is not None
+    v, side = Expr("velocity", (), 0), Expr("side")
+    next_side, after = (substitute(x, {v: -v}) for x in (turn, reset))
+    last_side, last = (substitute(x, {v: -after, side: next_side}) for x in (turn, reset))
+    speed = gap_rate * v
+    next_speed, last_speed = (substitute(gap_rate, {side: s}) * x for s, x in ((next_side, after), (last_side, last)))
+    flights = speed / pull + next_speed / substitute(pull, {side: next_side})
+    return -2.0 * flights / (1.0 - last_speed / speed)
+
+
+def number_slopes(trace: Trace) -> list[Expr]:
+    """The derivatives, along each column, of the numbers that events at contacts need; one column after the other."""
+    return [derivative_along(trace, x, j) for j in range(trace.columns) for x in trace.contact_numbers]
+
+
+def reaction_slopes(trace: Trace, reaction: Expr) -> list[Expr]:
+    """The derivative of a reaction along each column at a fixed time: -dt times the reaction's rate, where it reaches 0."""
+    accelerations = {Expr("acceleration", (), i): a for i, a in enumerate(trace.acceleration[: trace.dof])}
+    return [derivative_along(trace, substitute(reaction, accelerations), j) for j in range(trace.columns)]
+
+
+def margin_shift(trace: Trace, margin: Expr) -> list[Expr]:
+    """The shift of the instant at which a margin m(q, v, a, t, c) reaches 0: -(m_q u + m_v z + m_c) / (m_t + m_q v + m_v a),
+    where a is substituted by the model's acceleration."""
+    a = trace.acceleration[: trace.dof]
+    margin = substitute(margin, {Expr("acceleration", (), i): a[i] for i in range(trace.dof)})
+    speed = time_derivative(trace, margin)
+    for i in range(trace.dof):
+        speed = speed + differentiate(margin, Expr("coordinate", (), i)) * Expr("velocity", (), i)
+        speed = speed + differentiate(margin, Expr("velocity", (), i)) * a[i]
+    return [-derivative_along(trace, margin, j) / speed for j in range(trace.columns)]

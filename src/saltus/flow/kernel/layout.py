@@ -1,0 +1,165 @@
+"""Definitions that the scalar kernel shares with its callers: modes, reasons to return, places in its arrays, and thresholds.
+
+Members of the enumerations become plain numbers in the compiled text (see `compiled_part`). The thresholds below the marker are
+compiled together with the kernel.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+
+
+class Mode(IntEnum):
+    """What a motion is doing."""
+
+    ARC = 0  # moving smoothly on one side
+    CONTACT = 1  # at the contact, where the next mode has to be decided
+    REST = 2  # held at the contact until an acceleration points outward
+    CHATTER = 3  # impacts without loss, too small and too many to follow one by one
+    BEYOND = 4  # on no side of the contact: the model has no such state
+
+
+class Status(IntEnum):
+    """Why the kernel returns; from CAPTURED on only the lanes give these reasons."""
+
+    DONE = 0
+    FULL = 1  # a buffer is full
+    PAUSED = 2  # a batch of steps is done
+    NOT_UNIQUE = 3
+    NO_IMPACT = 4
+    NOT_FINITE = 5
+    STALLED = 6
+    LIMITED = 7
+    SMOOTH = 8  # the motion is smooth again, so that its lane can go on together with the others
+    CAPTURED = 9
+    SETTLED = 10
+    OUTSIDE = 11
+    UNRESOLVED = 12
+
+
+class GrazingDetail(IntEnum):
+    """The kinds of grazing."""
+
+    TOUCH = 0  # a double root of the gap
+    TRIPLE = 1  # a triple root: the motion goes on from rest at the contact
+
+
+class Where(IntEnum):
+    """Places in the array `where` of whole numbers, which together with `state` describes where a motion is."""
+
+    PERIOD = 0  # the forcing period
+    MODE = 1
+    SIDE = 2
+    SKIP = 3  # order of the gap's known zero at the start of an arc; the side just released in CONTACT from rest
+    PIECE = 4  # of the records
+    STEPS = 5  # recorded in the buffer
+    EVENTS = 6  # recorded in the buffer
+    LAST_PERIOD = 7  # in which the motion ends
+    ORDER = 8  # of the Taylor series
+    DENSE = 9  # whether steps are recorded
+    LEAVE_BY = 10  # the side that the caller has chosen for a motion from rest at the contact that is not unique; or 0
+    HELD = 11  # whether the motion was at rest or in chatter before
+    DOF = 12  # coordinates that are followed, OWN (1 + COLUMNS)
+    MARGINS = 13  # the number of margins at which the motion stops
+    ROWS = 14  # of the workspace
+    SIDES = 15  # of the contact
+    CHECKED = 16  # whether steps are checked, because the structure has functions with steep changes that a series may miss
+    UNTIL_SMOOTH = 17  # whether to return as soon as the motion is smooth again (see `lanes/driver.py`)
+    OWN = 18  # the model's own coordinates
+    COLUMNS = 19  # of the tangent
+
+
+# The places of `Structure.sizes`, in their order.
+STRUCTURE_SIZES = [Where.DOF, Where.MARGINS, Where.ROWS, Where.SIDES, Where.CHECKED, Where.OWN, Where.COLUMNS]
+
+
+class Setting(IntEnum):
+    """Places in the array `settings`."""
+
+    LENGTH = 0  # of a forcing period
+    END = 1  # of the motion, as a time within its last forcing period
+    TOLERANCE = 2
+    HORIZON = 3  # for the scalar steps of a lane, which end with its forcing period: the local time at which its motion ends
+
+
+class Work(IntEnum):
+    """Places in the tuple `work` of arrays: Taylor coefficients of a step and the space to compute them."""
+
+    POSITIONS = 0
+    VELOCITIES = 1
+    ACCELERATIONS = 2
+    GAP = 3
+    MARGINS = 4
+    RECURRENCES = 5
+    POLYNOMIAL = 6  # scaled to a step of 1
+    CONTACT = 7  # contact accelerations of both sides
+    STEP_END = 8  # the first five again, evaluated at the end of a step
+
+
+class ModelPart(IntEnum):
+    """Places in the tuple `model`: the functions of a structure that the kernel calls, and the geometry of its contact."""
+
+    SERIES = 0
+    CONTACT_SERIES = 1
+    RESET = 2
+    CONTACT_DAMPING = 3
+    GEOMETRY = 4
+    TANGENT = 5
+
+
+class Geometry(IntEnum):
+    """Places in the array of a structure's geometry: the coordinate at contact, and how the gap changes with it on each side."""
+
+    CONTACT = 0
+    RATE_UP = 1
+    RATE_DOWN = 2
+
+
+class SegmentValue(IntEnum):
+    """Columns of the numbers at the ends of each smooth segment of an orbit with one contact (`one_contact/segments.py`)."""
+
+    QUOTIENT = 0  # (x - contact) / duration
+    RESET_DRIFT = 1  # dv+/dt
+    FIRST_STATE = 2  # from here on coordinates, velocities and accelerations at the end, then at the start
+
+
+class SegmentColumn(IntEnum):
+    """Columns of the extremes along such a segment; inf where there is no such extreme."""
+
+    LOWEST_GAP = 0  # the lowest inner minimum of the gap
+    LOWEST_GAP_TIME = 1
+    HIGHEST = 2  # the largest value of any coordinate
+    LOWEST = 3  # the least
+    CROSSINGS = 4  # the number of passages of the contact
+    SHALLOWEST = 5  # the least depth of an arc
+    DEEPEST = 6  # the depth of the last arc
+    LEAST_MARGIN = 7  # the least values of the margins, from here on
+
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+WHERE_LENGTH, SETTING_COUNT = 20, 4  # lengths of the arrays `where` and `settings`
+
+# The length of a step.
+SAFETY = 0.9  # The error of a step is then a tenth of tol, and the energy drifts by less than 1e-12 in 1000 periods.
+GAP = 0.65  # largest difference of the log radius of convergence by the last terms and by earlier ones: 0.6 for a sine
+SMALLEST = 1e-6  # The error of a step is relative to the size of the state, but absolute below this size.
+SHORTEST = 1e-9  # A shorter step, in units of time or of a shorter forcing period, means that the acceleration is singular.
+ROUGHER = 100.0  # The tolerance of a column's series in units of tol; so the motion alone decides nearly all steps.
+DEFECT = 100.0  # The largest defect of a series in the equation at the end of a step, in tol size / h; sound steps stay below 4.
+BATCH = 100_000  # passes of the loop before the kernel returns to Python, which can then see Ctrl-C
+
+# Rest and release.
+ZERO = 1e-14  # A smaller acceleration at the contact counts as zero, as it is a difference of loads of order 1.
+EXACT = 1e-15  # The tolerance at rest: a small error could turn a touch into a release, and steps cost little there.
+TINY = 1e-60  # a speed that stands for the limit 0, and whose square is still a number
+
+# Accumulations of impacts.
+SLOW = 3.0  # in sqrt(tol): after faster impacts the end of an accumulation is not looked for
+LOSSLESS = 1e-12  # A smaller loss of speed over two impacts is rounding.
+CHATTER_SPEED = 1e-5  # Here the averaged law has an error of 5e-5 of the speed, and a unit of time would have 1e5 impacts.
+SLOWLY = 0.02  # the largest change of the contact accelerations over two impacts for which the averaged law is used
+GAUSS_NODES = np.array([0.0694318442029737, 0.3300094782075719, 0.6699905217924281, 0.9305681557970263])
+GAUSS_WEIGHTS = np.array([0.1739274225687269, 0.3260725774312731, 0.3260725774312731, 0.1739274225687269])

@@ -1,0 +1,155 @@
+"""The compiled code of the lanes: one driver for all models, and three functions of each structure."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from functools import cache
+from types import ModuleType
+from typing import Any
+
+from saltus.flow.contacts import complementarity, solver_memory
+from saltus.flow.contacts import impacts as contact_impacts
+from saltus.flow.contacts import layout as contact_layout
+from saltus.flow.kernel import function_types as scalar_types
+from saltus.flow.kernel import layout as kernel_layout
+from saltus.flow.kernel import memory_layout, roots
+from saltus.flow.kernel.compiled import contacts_module, kernel_module
+from saltus.flow.lanes import (
+    contact_function_types,
+    contact_steps,
+    contacts_handoff,
+    contacts_of_lane,
+    driver,
+    forcing_periods,
+    function_types,
+    lane_impacts,
+    lane_layout,
+    lane_state,
+    lane_steps,
+    meeting,
+    sampling,
+    scalar_fallback,
+    scalar_handoff,
+)
+from saltus.flow.lanes.lane_functions import Slots, lane_functions_text, slots_of
+from saltus.flow.one_contact import lane_step as one_contact
+from saltus.flow.one_contact import sides as contact_side
+from saltus.taylor import (
+    Trace,
+    check_size,
+    compiled_part,
+    digest,
+    entry_point,
+    generated_header,
+    is_compiled,
+    lane_vectors,
+    load_module,
+    module_name,
+    pointer,
+    records,
+    source_of,
+)
+
+_TYPES = (scalar_types, function_types, contact_function_types, lane_vectors)
+_WRITTEN_BY = digest(*(source_of(module) for module in _TYPES))
+_SIGNATURES = f"""
+from saltus.flow.lanes.function_types import *
+from saltus.taylor.lane_vectors import *
+from saltus.taylor.private_numba import cached_jit, inline_jit, jit, lean_jit, pointed_jit
+from saltus.taylor.references import by_reference
+# types and vectors of {_WRITTEN_BY}
+"""
+
+
+@cache
+def load_driver(several: bool = False) -> Callable[..., None]:
+    """The driver of all lanes, `run_lanes` of `driver.py`, for models with one or several contacts; it releases Python's lock."""
+    return entry_point(load_module("lanes", _driver_text(several)).run_lanes)
+
+
+def _driver_text(several: bool) -> str:
+    of_several = (
+        contact_layout,
+        solver_memory,
+        complementarity,
+        contact_impacts,
+        contacts_of_lane,
+        contact_steps,
+        lane_impacts,
+    )
+    step = of_several if several else (one_contact,)
+    common = (memory_layout, kernel_layout, lane_layout, contact_side, records, lane_steps, meeting, sampling)
+    return _text(several, *common, *step, forcing_periods, driver)
+
+
+def _text(several: bool, *modules: ModuleType) -> str:
+    """One source of the compiled parts of several files, for vectors of this machine's width."""
+    types = "from saltus.flow.lanes.contact_function_types import *\n" if several else ""
+    return generated_header(_SIGNATURES + types) + "".join(compiled_part(module) for module in modules)
+
+
+@cache
+def compile_driver_aside(several: bool) -> subprocess.Popen[bytes] | None:
+    """A process that compiles the driver while this one compiles the rest; None if the driver is already on disk.
+
+    Further calls return the same process, which may have ended since.
+    """
+    if is_compiled(module_name("lanes", _driver_text(several))):
+        return None
+    try:
+        found = f"import sys; sys.path[:] = {sys.path!r}; "  # the other process finds packages where this one does
+        call = f"{found}from {__name__} import load_driver; load_driver({several})"
+        return subprocess.Popen([sys.executable, "-c", call])
+    except OSError:
+        return None
+
+
+@cache
+def load_helpers(several: bool = False) -> tuple[Any, ...]:
+    """The functions that the driver calls for one lane: `lane_root`, `turning_range`, `scalar_motion`; with several contacts also
+    `contacts_impact`."""
+    names = ["lane_root", "turning_range", "scalar_motion"]
+    parts = [kernel_layout, lane_layout, records, roots, scalar_fallback, lane_state]
+    if several:
+        names.append("contacts_impact")
+        parts += [contact_layout, complementarity, contact_impacts, contacts_of_lane, contacts_handoff]
+    else:
+        parts.append(scalar_handoff)
+    module = load_module("lane_helpers", _text(several, *parts))
+    return tuple(pointer(getattr(module, name)) for name in names)
+
+
+def load_lane_functions(trace: Trace) -> tuple[Slots, tuple[Any, ...]]:
+    """The memory layout of a structure and its functions for lanes.
+
+    Raises
+    ------
+    TraceError
+        Compiling them would take minutes.
+    """
+    check_size(trace, lanes=True)
+    module = load_module("lane", generated_header(_SIGNATURES) + lane_functions_text(trace))
+    names = ("series", "impact", "field", "one_free")[: 4 if trace.several else 3]
+    return slots_of(trace), tuple(pointer(getattr(module, f"lane_{name}")) for name in names)
+
+
+@cache
+def load_advance(several: bool = False) -> Any:
+    """The scalar kernel, which the driver calls for one lane."""
+    return pointer(contacts_module().advance_contacts if several else kernel_module().advance)
+
+
+def compile_everything(several: bool = False) -> None:
+    """Compile the driver, its helpers and the scalar kernel, or load them from disk if they are there."""
+    load_driver(several)
+    load_helpers(several)
+    load_advance(several)
+
+
+def compile_beside(driver: subprocess.Popen[bytes], several: bool) -> None:
+    """Compile the helpers and the scalar kernel while another process compiles the driver, and wait for that process."""
+    load_helpers(several)
+    load_advance(several)
+    driver.wait()

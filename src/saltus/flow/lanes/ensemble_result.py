@@ -1,0 +1,150 @@
+"""The ends and the samples of the trajectories of an ensemble, read from the arrays that the lanes have written."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from saltus.flow.kernel.layout import Mode, Status
+from saltus.flow.lanes.inputs import Inputs
+from saltus.flow.lanes.lane_layout import EndLabel, EndNumber, JobLabel, JobNumber
+from saltus.flow.lanes.threads import Ends, Jobs
+from saltus.flow.lanes.wanted import Sample, Wanted
+from saltus.flow.motion.stops import Stop
+from saltus.systems import System
+from saltus.taylor import FREQUENCY
+
+STOPS = {
+    Status.DONE: Stop.HORIZON,
+    Status.LIMITED: Stop.LIMIT,
+    Status.CAPTURED: Stop.CAPTURED,
+    Status.SETTLED: Stop.SETTLED,
+    Status.NOT_UNIQUE: Stop.NOT_UNIQUE,
+    Status.NO_IMPACT: Stop.NO_IMPACT,
+    Status.NOT_FINITE: Stop.NOT_FINITE,
+    Status.STALLED: Stop.STALLED,
+    Status.OUTSIDE: Stop.OUTSIDE,
+    Status.UNRESOLVED: Stop.UNRESOLVED,
+}  # by the driver's reason; a motion that is DONE at rest ends with Stop.REST
+NUMBERS = {stop: number for number, stop in enumerate(Stop)}  # in a dataset
+
+
+@dataclass(frozen=True, eq=False)
+class EnsembleResult:
+    """The results of an ensemble, with a row for each trajectory, whatever the ensemble's shape."""
+
+    system: System
+    inputs: Inputs
+    wanted: Wanted
+    jobs: Jobs
+    ends: Ends
+
+    @property
+    def rows(self) -> int:
+        """The number of coordinates, including those of the tangent's columns."""
+        return int(self.jobs.states.shape[1] // 2)
+
+    @property
+    def last(self) -> np.ndarray:
+        """The states at the end, coordinates and then velocities, (n, d)."""
+        own = len(self.system.model.coordinates)
+        return np.concatenate([self.ends.states[:, :own], self.ends.states[:, self.rows : self.rows + own]], axis=1)
+
+    @property
+    def held(self) -> np.ndarray:
+        """Which trajectories are held at the contact at the end, at rest or in chatter, (n,)."""
+        mode = self.ends.of(EndLabel.MODE)
+        return np.asarray((mode == Mode.REST) | (mode == Mode.CHATTER))
+
+    @property
+    def side(self) -> np.ndarray:
+        """The side of the contact at the end, 0 at rest; with several contacts 1 if the motion is not at rest, (n,)."""
+        side = self.ends.of(EndLabel.SIDE)
+        return np.where(self.held, 0, np.ones_like(side) if self.system.model.contacts else side)
+
+    @property
+    def time(self) -> np.ndarray:
+        """The dimensionless time at the end, (n,)."""
+        length, local = self.jobs.numbers[:, JobNumber.PERIOD_LENGTH], self.ends.numbers[:, EndNumber.TIME]
+        return np.asarray(self.ends.of(EndLabel.PERIOD) * length + local)
+
+    @property
+    def elapsed(self) -> np.ndarray:
+        """The time from the start to the end, counted within their forcing periods, (n,)."""
+        return np.asarray(self.ends.numbers[:, EndNumber.TIME] - self.jobs.numbers[:, JobNumber.START_TIME])
+
+    @property
+    def whole_periods(self) -> np.ndarray:
+        """The number of the forcing period in which a trajectory ended less that in which it began, (n,)."""
+        return np.asarray(self.ends.of(EndLabel.PERIOD) - self.jobs.labels[:, JobLabel.FIRST_PERIOD])
+
+    @property
+    def periods(self) -> np.ndarray | None:
+        """The forcing periods from the start to the end, (n,); None without a forcing."""
+        length = self.jobs.numbers[:, JobNumber.PERIOD_LENGTH]
+        return self.whole_periods + self.elapsed / length if (length > 0).all() else None
+
+    @cached_property
+    def stops(self) -> np.ndarray:
+        """Why each ended, the number of a `Stop`, (n,)."""
+        reasons = self.ends.of(EndLabel.STATUS)
+        numbers = np.full(reasons.shape, -1, dtype=np.int8)
+        for reason, stop in STOPS.items():
+            numbers[reasons == reason] = NUMBERS[stop]
+        numbers[(reasons == Status.DONE) & (self.ends.of(EndLabel.MODE) == Mode.REST)] = NUMBERS[Stop.REST]
+        if self.system.model.singularity:  # steps that shrink to nothing mean a singularity that the model names
+            numbers[reasons == Status.STALLED] = NUMBERS[Stop.SINGULAR]
+        return numbers
+
+    def stopped(self, *stops: Stop) -> np.ndarray:
+        """Which ended for one of these reasons, (n,)."""
+        return np.isin(self.stops, [NUMBERS[stop] for stop in stops])
+
+    @property
+    def recurrence_period(self) -> np.ndarray:
+        """The forcing periods after which each repeats itself, 0 where it has not settled, (n,)."""
+        return np.where(self.ends.of(EndLabel.STATUS) == Status.SETTLED, self.ends.of(EndLabel.DETAIL), 0)
+
+    @cached_property
+    def samples(self) -> dict[Sample, np.ndarray]:
+        """The samples of the last forcing periods, in the order of time, (n, kept, columns); nan where there were fewer."""
+        kept, done = self.ends.samples.shape[1], self.ends.of(EndLabel.PERIODS_DONE)
+        order = (done[:, None] + np.arange(kept)) % kept  # the oldest first
+        samples = np.take_along_axis(self.ends.samples, order[:, :, None], axis=1)
+        samples[np.arange(kept)[None, :] < (kept - done)[:, None]] = np.nan
+        found, column = {}, 0
+        for kind in (kind for kind in Sample if kind in self.wanted.sample):
+            width = len(kind.columns(len(self.system.model.coordinates)))
+            found[kind] = samples[:, :, column : column + width]
+            column += width
+        return found
+
+    @cached_property
+    def derivatives(self) -> np.ndarray:
+        """The derivatives of the end state to the initial one and to the parameters that were asked for, (n, d, d + parameters).
+
+        The time at the start is fixed, and so is the time at the end, with two exceptions. If periods were asked for and the
+        motion ends after n of them, its end, start + n 2 pi / W, moves with the frequency W. If it ends at a margin, the end
+        moves with the margin.
+        """
+        paths = self.wanted.paths or ()
+        ends, own, rows = self.ends, len(self.system.model.coordinates), self.rows
+        q = ends.states[:, own:rows].reshape(-1, 2 * own + len(paths), own)
+        v = ends.states[:, rows + own :].reshape(-1, 2 * own + len(paths), own)
+        derivatives = np.concatenate([q, v], axis=2).transpose(0, 2, 1).copy()
+        rates = ends.numbers[:, EndNumber.RATES : EndNumber.RATES + own]
+        shifts = ends.numbers[:, EndNumber.RATES + own :]
+        slope = np.concatenate([self.last[:, own:], rates], axis=1)
+        limited = ends.of(EndLabel.STATUS) == Status.LIMITED
+        with np.errstate(invalid="ignore"):  # the instant at which a margin is reached without speed has no derivative
+            derivatives[limited] += slope[limited, :, None] * shifts[limited, None, :]
+        if self.wanted.periods is not None and FREQUENCY in paths:
+            at_period_end = np.isin(ends.of(EndLabel.STATUS), (Status.DONE, Status.SETTLED))
+            moving = at_period_end & (ends.of(EndLabel.MODE) == Mode.ARC)
+            length = self.jobs.numbers[:, JobNumber.PERIOD_LENGTH]
+            span = self.whole_periods * length + self.elapsed
+            shift = np.where(moving, -span * length / (2.0 * np.pi), 0.0)  # of the end, -span / W
+            derivatives[:, :, 2 * own + paths.index(FREQUENCY)] += np.where(moving[:, None], shift[:, None] * slope, 0.0)
+        return derivatives

@@ -1,0 +1,96 @@
+"""The arguments of an ensemble: states, times and parameters, broadcast together and checked before anything runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.checks import LIMITS, check_memory
+from saltus.errors import ParameterError
+from saltus.flow.lanes.ensemble_dataset import result_names
+from saltus.flow.motion.dataset import rate_name
+from saltus.flow.motion.request import check_coordinates
+from saltus.systems import System, broadcast_arrays, check_parameters, finite_array, numbers, parameter_table
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """The starts and parameters of the trajectories: each a flat array, or one number for all of them."""
+
+    dims: tuple[str, ...]
+    shape: tuple[int, ...]
+    coords: dict[str, Any]  # of the result: DataArrays or, along a dimension of the same name, arrays
+    values: dict[str, np.ndarray]  # coordinates, velocities and the time by their names, parameters by their paths
+    paths: tuple[str, ...]  # those of the parameters
+
+    @property
+    def size(self) -> int:
+        """How many trajectories there are."""
+        return math.prod(self.shape)
+
+    @property
+    def parameters(self) -> dict[str, np.ndarray]:
+        """The parameters that were given, by path."""
+        return {path: self.values[path] for path in self.paths}
+
+
+def read_inputs(system: System, velocity: Any, time: Any, parameters: Any, coordinates: Mapping[str, Any]) -> Inputs:
+    """Broadcast and check the arguments of an ensemble.
+
+    Raises
+    ------
+    ParameterError
+        Names are unknown to the system; values are no finite numbers, or refused by the system; shapes do not fit together; or a
+        dimension or coordinate has the name of a result.
+    """
+    given = parameter_table(system, parameters)
+    arrays = {name: finite_array(name, value) for name, value in (_starts(system, velocity, time, coordinates) | given).items()}
+    dims, shape, coords, together = broadcast_arrays(arrays)
+    check_parameters(system, broadcast_arrays({path: arrays[path] for path in given})[3])
+    _check_names(system, dims, coords, arrays, given)
+    size = math.prod(shape)
+    check_memory(dims[0] if dims else "parameters", float(size) * LIMITS.motion, f"{size} motions at once")
+    return Inputs(dims, shape, coords, together, tuple(given))
+
+
+def _starts(system: System, velocity: Any, time: Any, coordinates: Mapping[str, Any]) -> dict[str, Any]:
+    """The state and the time at the start, by name."""
+    names = system.model.coordinates
+    check_coordinates(system, coordinates)
+    speeds = (velocity,) if len(names) == 1 else velocity
+    if not isinstance(speeds, (tuple, list)) or len(speeds) != len(names):
+        raise ParameterError(f"velocity must be a tuple of {len(names)} numbers or arrays, got {velocity!r}", "velocity")
+    starts = {name: coordinates[name] for name in names}
+    starts |= {rate_name(name, names): speed for name, speed in zip(names, speeds, strict=True)}
+    return starts | {"time": time}
+
+
+def _check_names(
+    system: System, dims: tuple[str, ...], coords: dict[str, Any], arrays: dict[str, Any], given: Iterable[str]
+) -> None:
+    """Refuse dimensions and coordinates with the name of a result, and coordinates that contradict the parameters."""
+    results = result_names(system.model.coordinates)
+    for name in (*dims, *coords):
+        if name in results:
+            what = "dimension" if name in dims else "coordinate"
+            free = name.removeprefix("start_")
+            raise ParameterError(
+                f"a {what} cannot be called {name!r}, as a result is; call it initial_{free}, or as you like"
+                + ("" if name in dims else f", or leave it out: .drop_vars({name!r})")
+            )
+    own = dict(numbers(system))
+    for path in (path for path in own if path in coords):
+        if not same(coords[path], arrays.get(path, own[path])):
+            use = "other values than parameters give" if path in given else f"other values than the system's {own[path]:g}"
+            raise ParameterError(
+                f"the coordinate {path!r} has {use}; give them in parameters={{{path!r}: ...}}, or call the coordinate otherwise"
+            )
+
+
+def same(one: Any, other: Any) -> bool:
+    """Whether two arrays or numbers are equal wherever they are, broadcast by name."""
+    return bool(np.all(one == other))

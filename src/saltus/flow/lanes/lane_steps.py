@@ -1,0 +1,325 @@
+"""One step of a group of lanes: its length, the roots of the gap within it, and the new state.
+
+Its compiled part goes into one module with that of `driver.py`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from saltus.flow.kernel.layout import DEFECT, SMALLEST
+from saltus.flow.kernel.memory_layout import SERIES_LENGTH, LanePart
+from saltus.flow.lanes.lane_layout import Code, Size, Slot
+from saltus.taylor import (
+    ALL,
+    WIDTH,
+    absolute,
+    bits,
+    fma,
+    inline_jit,
+    lean_jit,
+    load,
+    mask,
+    maximum,
+    minimum,
+    replace,
+    rough_exp2,
+    rough_inverse,
+    rough_log2,
+    rough_root,
+    select,
+    splat,
+)
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+ZERO_TERM = 1e-300
+LAST_TERMS = 4  # the largest of so many last terms of a series limits the step: two of them may nearly vanish together
+LOG_GAP = 0.35 * math.log2(math.e)  # like `kernel_layout.GAP`, but for the last four terms: if these vanish, so do others
+NEARLY = 1e-5  # of the time, and of the slope: after a shorter move the root is exact to rounding, as its cube is rounding
+
+
+@lean_jit
+def row_count(at):
+    """How many coordinates there are, those of the sensitivities included."""
+    return at[LanePart.VELOCITY] - at[LanePart.POSITION]
+
+
+@lean_jit
+def step_limits(order, tol):
+    """Constants of `row_step`: log2 of tol; log2 of the factor by which the step from the last terms may exceed the one from the
+    upper half of a series, and this factor; and one over the orders of the last terms.
+
+    They are computed once for a run, because a call of the C library in every step would put all registers into memory.
+    """
+    log_tol = math.log2(tol)
+    rarely = -log_tol / order - LOG_GAP
+    return log_tol, rarely, 2.0**rarely, (1.0 / (order - 3), 1.0 / (order - 2), 1.0 / (order - 1), 1.0 / order)
+
+
+@inline_jit
+def state_size(m, at, sizes):
+    """The largest coordinate or velocity."""
+    size = splat(SMALLEST)
+    for row in range(sizes[Size.OWN]):
+        size = maximum(
+            size, maximum(absolute(load(m, at[LanePart.POSITION] + row)), absolute(load(m, at[LanePart.VELOCITY] + row)))
+        )
+    return size
+
+
+@inline_jit
+def natural_step(m, at, sizes, limits, size):
+    """The step that the series of all rows allow, including those of the tangent's columns, relative to the size of the state.
+
+    `limits` are the `step_limits` of the rows and of the columns.
+    """
+    rows = sizes[Size.OWN]
+    step = row_step(m, at[LanePart.VELOCITIES], sizes[Size.ORDER], size, limits[0])
+    for row in range(1, rows):
+        step = minimum(step, row_step(m, at[LanePart.VELOCITIES] + row * SERIES_LENGTH, sizes[Size.ORDER], size, limits[0]))
+    for first in range(rows, rows * (1 + sizes[Size.COLUMNS]), rows):
+        step = minimum(step, column_step(m, at, sizes, first, limits[1]))
+    return step
+
+
+@lean_jit
+def column_step(m, at, sizes, first, limits):
+    """The step that the series of a column of the tangent allows, relative to its own size (`steps.column_step`)."""
+    size, step = splat(ZERO_TERM), splat(np.inf)
+    for row in range(first, first + sizes[Size.OWN]):
+        size = maximum(
+            size, maximum(absolute(load(m, at[LanePart.POSITION] + row)), absolute(load(m, at[LanePart.VELOCITY] + row)))
+        )
+        size = maximum(size, absolute(load(m, at[LanePart.VELOCITIES] + row * SERIES_LENGTH + 1)))
+    for row in range(first, first + sizes[Size.OWN]):
+        step = minimum(step, row_step(m, at[LanePart.VELOCITIES] + row * SERIES_LENGTH, sizes[Size.ORDER], size, limits))
+    return step
+
+
+@inline_jit
+def row_step(m, series, order, size, limits):
+    """The step at which the largest of a series' last terms is tol, relative to `size`.
+
+    If the last terms vanish, the growth of the series is taken from all terms of its upper half, as in `steps.step_size`.
+    """
+    log_tol, rarely, factor, inverses = limits
+    wanted = log_tol + rough_log2(size)
+    step = splat(500.0)
+    for j in range(LAST_TERMS):
+        term = absolute(load(m, series + order - LAST_TERMS + 1 + j))
+        step = minimum(step, (wanted - rough_log2(maximum(splat(ZERO_TERM), term))) * inverses[j])
+    step = maximum(step, splat(-500.0))
+    natural, half = rough_exp2(step), order // 2
+    reach, upper = natural * factor, absolute(load(m, series + order - LAST_TERMS))
+    for k in range(order - LAST_TERMS - 1, half - 1, -1):
+        upper = fma(upper, reach, absolute(load(m, series + k)))
+    vanishing = bits(rough_log2(upper) + half * (step + rarely) > wanted - log_tol + 1.0)
+    if vanishing:
+        shorter = rough_exp2(upper_half(m, series, order, wanted - log_tol, log_tol))
+        natural = select(mask(vanishing), minimum(shorter, natural), natural)
+    return natural
+
+
+@lean_jit
+def upper_half(m, series, order, log_size, log_tol):
+    """log2 of the step that the upper half of a series allows, without its last terms."""
+    step = splat(500.0)
+    for k in range(order // 2, order - LAST_TERMS + 1):
+        growth = (rough_log2(maximum(splat(ZERO_TERM), absolute(load(m, series + k)))) - log_size) * (1.0 / k)
+        step = minimum(step, log_tol / order - growth)
+    return step
+
+
+@inline_jit
+def sweep(m, at, row, order, start, h):
+    """Position (with `start` as its value at 0), velocity and acceleration of a coordinate at h, and B = h^2 sum_{j>=2} abs(a_j)
+    h^j.
+
+    B bounds the difference between the second derivative in u = t/h and that of the cubic q_0 + ... + q_3 h^3 u^3.
+    """
+    before = row * SERIES_LENGTH
+    positions, velocities = at[LanePart.POSITIONS] + before, at[LanePart.VELOCITIES] + before
+    accelerations = at[LanePart.ACCELERATIONS] + before
+    x, v, a = load(m, positions + order), load(m, velocities + order), load(m, accelerations + order - 1)
+    bend = absolute(a)
+    x, v = fma(x, h, load(m, positions + order - 1)), fma(v, h, load(m, velocities + order - 1))
+    for k in range(order - 2, 1, -1):
+        coefficient = load(m, accelerations + k)
+        x, v = fma(x, h, load(m, positions + k)), fma(v, h, load(m, velocities + k))
+        a, bend = fma(a, h, coefficient), fma(bend, h, absolute(coefficient))
+    x, v, a = fma(x, h, load(m, positions + 1)), fma(v, h, load(m, velocities + 1)), fma(a, h, load(m, accelerations + 1))
+    square = h * h
+    return fma(x, h, start), fma(v, h, load(m, velocities)), fma(a, h, load(m, accelerations)), bend * (square * square)
+
+
+@inline_jit
+def motion_at(m, at, row, order, start, h):
+    """Position (with `start` as its value at 0), velocity, acceleration, and half the acceleration's rate of change, at h."""
+    positions, velocities = at[LanePart.POSITIONS] + row * SERIES_LENGTH, at[LanePart.VELOCITIES] + row * SERIES_LENGTH
+    x, v, a, jerk = load(m, positions + order), load(m, velocities + order), splat(0.0), splat(0.0)
+    for k in range(order - 1, 0, -1):
+        jerk, a = fma(jerk, h, a), fma(a, h, v)
+        v, x = fma(v, h, load(m, velocities + k)), fma(x, h, load(m, positions + k))
+    jerk, a = fma(jerk, h, a), fma(a, h, v)
+    return fma(x, h, start), fma(v, h, load(m, velocities)), a, jerk
+
+
+@inline_jit
+def both_at(m, positions, velocities, order, start, h):
+    """Position (with `start` as its value at 0) and velocity at h. Even and odd powers are summed apart, so that the processor
+    works on four sums at once."""
+    square = h * h
+    top = order - (order & 1)
+    x, v = load(m, positions + top), load(m, velocities + top)
+    y, w = splat(0.0), splat(0.0)
+    if order & 1:
+        y, w = load(m, positions + order), load(m, velocities + order)
+    for k in range(top - 2, 0, -2):
+        x, v = fma(x, square, load(m, positions + k)), fma(v, square, load(m, velocities + k))
+        y, w = fma(y, square, load(m, positions + k + 1)), fma(w, square, load(m, velocities + k + 1))
+    x, v = fma(x, square, start), fma(v, square, load(m, velocities))
+    y, w = fma(y, square, load(m, positions + 1)), fma(w, square, load(m, velocities + 1))
+    return fma(y, h, x), fma(w, h, v)
+
+
+@inline_jit
+def shape(cubic, bend, skip):
+    """Properties that a gap p0 + p1 u + p2 u^2 + p3 u^3 + ... certainly has for u in [0, 1], from its cubic and the bound B of
+    the other terms (see `sweep`).
+
+    Returns bits of the lanes in which it has no root (apart from the one at 0 where `skip` is set), in which it falls, in which
+    it is concave, and in which it is convex; by the Bernstein coefficients of the cubic, of its derivatives, or of the gap over
+    u.
+    """
+    g0, g1, g2, g3 = cubic
+    rest = bend * (1.0 / 12.0)
+    end = g0 + g1 + g2 + g3
+    low = minimum(minimum(g0, g0 + g1 * (1.0 / 3.0)), minimum(g0 + (2.0 * g1 + g2) * (1.0 / 3.0), end))
+    low = select(mask(skip), minimum(minimum(g1, g1 + 0.5 * g2), g1 + g2 + g3), low)
+    steepest = maximum(maximum(g1, g1 + g2), g1 + 2.0 * g2 + 3.0 * g3)
+    falls = bits(steepest < bend * (-1.0 / 3.0))
+    first, last = 2.0 * g2, 2.0 * g2 + 6.0 * g3
+    return bits(low > rest), falls, bits(maximum(first, last) < -bend), bits(minimum(first, last) > bend)
+
+
+@inline_jit
+def root_move(value, inverse, second, third):
+    """The distance of a root from an argument, from the Taylor coefficients there and the inverse of the slope, to O(move^4)."""
+    n, a, b = value * inverse, second * inverse, third * inverse
+    return -n * fma(n, fma(n, fma(2.0 * a, a, -b), a), splat(1.0))
+
+
+@inline_jit
+def guess_from_end(cubic, end, sign, h):
+    """The root in [0, h] of the sextic that has the gap's values and derivatives at both ends of a step.
+
+    Scaled to a step of 1, the gap is g0 + g1 u + g2 u^2 + g3 u^3 + ... at the start; at the end it is f, with its slope and half
+    its curvature, `pull`. The root is one move (`root_move`) from the root of the parabola at the end; d is its distance from the
+    end.
+    """
+    f, slope, pull = sign * end[0], sign * end[1] * h, 0.5 * sign * end[2] * (h * h)
+    g0, g1, g2, g3 = cubic
+    a, b, c = g0 - f + slope - pull, g1 - slope + 2.0 * pull, g2 - pull  # the difference from the parabola at the start
+    c3, c4 = 20.0 * a + 10.0 * b + 4.0 * c + g3, -45.0 * a - 25.0 * b - 11.0 * c - 3.0 * g3
+    c5, c6 = 36.0 * a + 21.0 * b + 10.0 * c + 3.0 * g3, -10.0 * a - 6.0 * b - 3.0 * c - g3
+    square = maximum(fma(slope, slope, -4.0 * f * pull), splat(0.0))
+    d = minimum(2.0 * f * rough_inverse(slope - rough_root(square)), splat(1.0))
+    p1 = fma(c6, d, c5)  # Horner's rule, repeated for the derivatives
+    p2 = fma(p1, d, c4)
+    p3 = fma(p2, d, c3)
+    p4 = fma(p3, d, pull)
+    p5 = fma(p4, d, -slope)
+    q1 = fma(c6, d, p1)
+    q2 = fma(q1, d, p2)
+    q3 = fma(q2, d, p3)
+    q4 = fma(q3, d, p4)
+    r1 = fma(c6, d, q1)
+    r2 = fma(r1, d, q2)
+    r3 = fma(r2, d, q3)
+    third = fma(fma(fma(c6, d, r1), d, r2), d, r3)
+    d = d + root_move(fma(p5, d, f), rough_inverse(fma(q4, d, p5)), fma(r3, d, q4), third)
+    return h - d * h
+
+
+@inline_jit
+def only_root(m, at, row, order, start, sign, guess, high, chosen):
+    """The root in (0, high] of gaps that have exactly one there: not negative at 0 (if zero, then growing), negative at `high`.
+
+    The search repeats `root_move` from a guess, with bisection if a move leaves the bracket; `sign` is 1 or -1. A lane that has
+    converged is not changed any more, whatever the others do. Returns the root and the velocity there.
+    """
+    low, speed, active = splat(0.0), splat(0.0), chosen
+    tau = select(mask(bits(guess > 0.0) & bits(guess <= high)), guess, 0.5 * high)  # the guess may have gone astray
+    for _ in range(60):
+        x, v, a, jerk = motion_at(m, at, row, order, start, tau)
+        inverse = rough_inverse(v)
+        inverse = inverse * (2.0 - v * inverse)
+        before = mask(bits(sign * x > 0.0))
+        low, high = select(before, tau, low), select(before, high, tau)
+        following = tau + root_move(x, inverse, 0.5 * a, (1.0 / 3.0) * jerk)
+        inside = mask(bits(following >= low) & bits(following <= high))
+        following = select(inside, following, 0.5 * (low + high))
+        move, going = following - tau, mask(active)
+        speed = select(going, fma(move, fma(move, jerk, a), v), speed)
+        tau = select(going, following, tau)
+        active &= bits(absolute(move) > NEARLY * tau) | bits(absolute(move * a) > NEARLY * absolute(v))
+        if active == 0:
+            break
+    return tau, speed
+
+
+@lean_jit
+def lane_value(m, series, order, lane, t):
+    """The value at t of one lane's series."""
+    value = m[(series + order) * WIDTH + lane]
+    for k in range(order - 1, -1, -1):
+        value = value * t + m[(series + k) * WIDTH + lane]
+    return value
+
+
+@lean_jit
+def margins_certain(m, at, sizes, h):
+    """Bits of the lanes in which every margin certainly stays positive over the step."""
+    sure = ALL
+    for stop in range(sizes[Size.MARGINS]):
+        series = at[LanePart.MARGINS] + stop * SERIES_LENGTH
+        rest = splat(0.0)
+        for k in range(sizes[Size.ORDER] - 1, 0, -1):
+            rest = fma(rest, h, absolute(load(m, series + k)))
+        sure &= bits(load(m, series) > rest * h)
+    return sure
+
+
+@lean_jit
+def series_true(code, m, at, sizes, tol, h, size):
+    """Bits of the lanes whose series give, at the end of the step, the acceleration that the model has there.
+
+    The new state must be in place. See `steps.leaps`.
+    """
+    code[Code.FIELD](m)
+    defect = splat(0.0)
+    for row in range(sizes[Size.OWN]):
+        series, slope = at[LanePart.ACCELERATIONS] + row * SERIES_LENGTH, splat(0.0)
+        for k in range(sizes[Size.ORDER] - 1, -1, -1):
+            slope = fma(slope, h, load(m, series + k))
+        defect = maximum(defect, absolute(load(m, at[LanePart.AFTER_VELOCITY] + row) - slope))
+    return bits(defect * h <= (DEFECT * tol) * size)
+
+
+@inline_jit
+def commit(at, m, moved, hit, speed):
+    """Make the new state the state of the lanes in `moved`, and the state after the impact that of the lanes in `hit`.
+
+    `speed` is the speed of the impacts.
+    """
+    going, impact = mask(moved), mask(hit)
+    replace(m, Slot.NOW, going, load(m, Slot.NEW_TIME))
+    replace(m, Slot.SIDE, impact, load(m, Slot.NEW_SIDE))
+    replace(m, Slot.LEAST_SPEED, impact, minimum(load(m, Slot.LEAST_SPEED), speed))
+    replace(m, Slot.IMPACTS, impact, load(m, Slot.IMPACTS) + 1.0)
+    for row in range(2 * row_count(at)):  # the slots of velocities follow those of positions
+        new = select(impact, load(m, at[LanePart.AFTER_POSITION] + row), load(m, at[LanePart.NEW_POSITION] + row))
+        replace(m, at[LanePart.POSITION] + row, going, new)

@@ -1,0 +1,334 @@
+"""Recurrence: many motions are followed until each rests, repeats itself or the time is up.
+
+Orbits, attractors, charts and diagrams all use this one engine to find where motions end. A motion recurs with the period q if
+its stroboscopic states, those at phase 0 of the load, come back to themselves after q forcing periods.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from saltus.enumerations import NumberedSentence
+from saltus.flow.kernel.structures import limits_of
+from saltus.flow.lanes.ensemble import run_ensemble, simulate_many
+from saltus.flow.lanes.ensemble_result import EnsembleResult
+from saltus.flow.lanes.inputs import read_inputs
+from saltus.flow.lanes.wanted import Sample, Until, Wanted, read_threads
+from saltus.flow.long_time.load_release import load_releases
+from saltus.flow.motion.dataset import state_names
+from saltus.flow.motion.stops import Stop
+from saltus.progress import Progress, silent
+from saltus.systems import System
+
+if TYPE_CHECKING:
+    import xarray
+
+
+@dataclass(frozen=True)
+class RecurrenceSettings:
+    """When a motion counts as periodic, in orbits, attractors, charts and diagrams."""
+
+    # The compiled lanes look for periods up to this one (`LONGEST_RECURRENCE` in flow/lanes/sampling.py). A motion has settled
+    # with the period q if 2 q + 2 successive states agree with those q forcing periods before to within `RECURRENT` (same file):
+    # 1e-10 of their size, or of 1 where they are smaller.
+    compiled_max_period: int = 16
+    # Longer periods are looked for in the last states of a motion that was followed to the end: the states of one period must
+    # agree with those of the period before to within this. It is larger because only two periods are compared.
+    long_agreement: float = 1e-9
+    # A motion that was followed to the end counts as periodic if its last state is this near to the one a period before: Newton's
+    # method then solves for the orbit, and fails if there is none.
+    near_return: float = 1e-6
+    # The error of one step, relative to the state: a tenth of the tolerance with which the compiled lanes compare states.
+    tol: float = 1e-11
+
+
+RECURRENCE = RecurrenceSettings()
+
+
+class Outcome(NumberedSentence):
+    """The outcome of a motion that was followed for some forcing periods."""
+
+    MOVING = 0, "it goes on moving without repeating itself"
+    HELD = 1, "it is at rest at the contact, from where a later load may pull it"
+    REST = 2, "it is at rest at the contact for all later loads"
+    PERIODIC = 3, "it repeats itself"
+    ENDED = 4, "it is ended by a margin of the model, or cannot go on"
+
+
+@dataclass(frozen=True, eq=False)
+class Recurrence:
+    """The outcomes of many motions, one row for each; a state has the coordinates, then their velocities, d numbers in all."""
+
+    outcome: np.ndarray  # (n,): an `Outcome` for each
+    period: np.ndarray  # (n,): forcing periods after which the motion repeats itself; 0 if it does not
+    periods: np.ndarray  # (n,): forcing periods for which it was followed
+    last: np.ndarray  # (n, d): the state at the end
+    states: np.ndarray  # (n, kept, d): the stroboscopic states, the last one last, nan where there were fewer
+    # (n, kept, 2): largest and smallest of all coordinates in each of these periods; nan where they were not recorded
+    extrema: np.ndarray | None = None
+    impact_counts: np.ndarray | None = None  # (n, kept): impacts in each of these periods
+    speeds: np.ndarray | None = None  # (n, kept): the least speed before an impact in each of these periods, inf without
+
+    def __len__(self) -> int:
+        return len(self.outcome)
+
+    @property
+    def rest(self) -> np.ndarray:
+        """Whether each motion is at rest at the contact for good, (n,)."""
+        return np.asarray(self.outcome == Outcome.REST)
+
+    @property
+    def periodic(self) -> np.ndarray:
+        """Whether each motion repeats itself, (n,)."""
+        return np.asarray(self.outcome == Outcome.PERIODIC)
+
+    @property
+    def ended(self) -> np.ndarray:
+        """Whether each motion was ended by a margin of the model, or cannot go on, (n,)."""
+        return np.asarray(self.outcome == Outcome.ENDED)
+
+    @property
+    def unsettled(self) -> np.ndarray:
+        """Whether each motion neither rests for good, nor repeats itself, nor has ended, (n,)."""
+        return np.asarray(self.outcome <= Outcome.HELD)
+
+    @property
+    def within_period(self) -> np.ndarray:
+        """Whether each kept forcing period is one of the motion's last `period` ones, (n, kept); all are if it has no period."""
+        kept = max(a.shape[1] for a in (self.states, self.extrema, self.impact_counts, self.speeds) if a is not None)
+        length = np.where(self.period > 0, self.period, kept)
+        return np.asarray(np.arange(kept)[::-1] < length[:, None])
+
+    @property
+    def highest(self) -> np.ndarray:
+        """The largest of all coordinates over the motion's period, (n,); -inf where none was recorded."""
+        assert self.extrema is not None
+        return np.asarray(np.nanmax(np.where(self.within_period, self.extrema[:, :, 0], np.nan), axis=1, initial=-np.inf))
+
+    @property
+    def lowest(self) -> np.ndarray:
+        """The smallest of all coordinates over the motion's period, (n,); inf where none was recorded."""
+        assert self.extrema is not None
+        return np.asarray(np.nanmin(np.where(self.within_period, self.extrema[:, :, 1], np.nan), axis=1, initial=np.inf))
+
+    @property
+    def impact_count(self) -> np.ndarray:
+        """The impacts over the motion's period, (n,)."""
+        assert self.impact_counts is not None
+        return np.asarray(np.nansum(np.where(self.within_period, self.impact_counts, 0.0), axis=1).astype(int))
+
+    @property
+    def slowest(self) -> np.ndarray:
+        """The least speed before an impact over the motion's period, (n,); 0 without impacts."""
+        assert self.speeds is not None
+        least = np.nanmin(np.where(self.within_period, self.speeds, np.nan), axis=1, initial=np.inf)
+        return np.asarray(np.where(np.isfinite(least), least, 0.0))
+
+    def only(self, rows: Any) -> Recurrence:
+        """The results of some of the motions."""
+        columns = {part.name: getattr(self, part.name) for part in fields(self)}
+        return replace(self, **{name: values[rows] for name, values in columns.items() if values is not None})
+
+    def after(self, periods: int, states: np.ndarray) -> Recurrence:
+        """These results as those of longer motions, which were followed for `periods` before and then had these states."""
+        return replace(self, periods=self.periods + periods, states=np.concatenate([states, self.states], axis=1))
+
+
+def find_recurrence(
+    system: System,
+    states: np.ndarray,
+    periods: int,
+    *,
+    parameters: Mapping[str, np.ndarray] | None = None,
+    captured: np.ndarray | None = None,
+    max_period: int = RECURRENCE.compiled_max_period,
+    kept: int | None = None,
+    extrema: bool = False,
+    impact_count: bool = False,
+    speed: bool = False,
+    from_start: bool = False,
+    stop_early: bool = True,
+    tol: float = RECURRENCE.tol,
+    threads: int | None = None,
+    progress: Progress = silent,
+    settings: RecurrenceSettings = RECURRENCE,
+) -> Recurrence:
+    """Follow motions from states at phase 0 until they rest for good, repeat themselves or the time is up.
+
+    A motion at the contact is at rest for good if it is proved to be captured, or if the load never pulls there. If motions have
+    parameters of their own, only the proof counts.
+
+    Parameters
+    ----------
+    system
+        What moves, under a load with a frequency.
+    states
+        The states at the start, (n, d): coordinates, then velocities.
+    periods
+        The largest number of forcing periods for which a motion is followed.
+    parameters
+        Numbers by dotted path, (n,) each, in place of the system's.
+    captured
+        The speeds below which the motions are proved to be captured, (n,), if they are known (`captured_between`); else nan.
+    max_period
+        The longest period that is looked for. Periods above 16 are found only if `kept` is more than twice as large.
+    kept
+        How many of the last stroboscopic states are kept, by default all; 0 for none.
+    extrema, impact_count, speed
+        Whether these are recorded, over max(kept, max_period) of the last forcing periods.
+    from_start
+        Whether extrema are recorded from the start; they always are if a limit of the model may end a motion. Otherwise recording
+        begins when a motion begins to repeat itself or its time is nearly up, and extrema are nan for motions that come to rest
+        for good or cannot go on.
+    stop_early
+        With False every motion is followed for all periods, and its period is read from the last states (`near_return`).
+    tol
+        The error that one step may make.
+    threads
+        How many cores to use; by default all.
+    progress
+        Called with the fraction done.
+    """
+    limits = limits_of(system, ())
+    sampled = {Sample.STATE: kept != 0, Sample.EXTREMA: extrema, Sample.IMPACT_COUNT: impact_count, Sample.SPEED: speed}
+    size = periods if kept is None else kept
+    wanted = Wanted(
+        tol=tol,
+        periods=periods,
+        limits=limits,
+        sample=tuple(name for name, chosen in sampled.items() if chosen),
+        until=(Until.REST, Until.SETTLED) if stop_early else (),
+        from_start=from_start or bool(limits),
+    )
+    last = max(1, min(max(size, max_period if extrema or impact_count or speed else 1), periods))
+    coordinates, velocity = _as_arguments(system, states)
+    inputs = read_inputs(system, velocity, 0.0, parameters, coordinates)
+    result = run_ensemble(system, inputs, wanted, read_threads(threads), progress, last=last, captured=captured)
+    found = replace(_read(result), outcome=_outcome(result, parameters is not None))
+    if found.extrema is not None and not wanted.from_start:
+        found.extrema[~result.stopped(Stop.HORIZON, Stop.REST, Stop.SETTLED)] = np.nan
+    return _with_periods(found, result.recurrence_period if stop_early else None, max_period, settings)
+
+
+def motions_from(system: System, states: np.ndarray, **options: Any) -> xarray.Dataset:
+    """`simulate_many` from states (n, d) at phase 0; `ensemble_from` is faster."""
+    coordinates, velocity = _as_arguments(system, states)
+    return simulate_many(system, **coordinates, velocity=velocity, **options)
+
+
+def ensemble_from(
+    system: System,
+    states: np.ndarray,
+    periods: int,
+    *,
+    parameters: Mapping[str, np.ndarray],
+    tol: float,
+    until: tuple[str, ...] = (),
+    derivatives: bool = False,
+) -> EnsembleResult:
+    """The ends of motions from states (n, d) at phase 0 as arrays: making a dataset takes longer than following a few motions.
+
+    With `derivatives` those to the initial states are computed, too.
+    """
+    paths = () if derivatives else None
+    wanted = Wanted(tol=tol, periods=periods, limits=limits_of(system, ()), until=until, paths=paths)
+    coordinates, velocity = _as_arguments(system, states)
+    inputs = read_inputs(system, velocity, 0.0, parameters, coordinates)
+    return run_ensemble(system, inputs, wanted, read_threads(None), silent)
+
+
+def _as_arguments(system: System, states: np.ndarray) -> tuple[dict[str, Any], Any]:
+    """States (n, d) as `simulate_many` takes them: coordinates by name, and the velocity."""
+    names = system.model.coordinates
+    velocities = tuple(states[:, len(names) + i] for i in range(len(names)))
+    return {name: states[:, i] for i, name in enumerate(names)}, velocities[0] if len(names) == 1 else velocities
+
+
+def last_states(system: System, result: xarray.Dataset) -> np.ndarray:
+    """The states at the end of an ensemble's motions, (..., d)."""
+    return np.stack([result[name].values for name in state_names(system.model.coordinates)], axis=-1)
+
+
+def return_distances(states: np.ndarray, max_period: int) -> np.ndarray:
+    """The distance of the last of the states (..., kept, d) from those q = 1, 2, ... periods before, (..., max_period or
+    fewer)."""
+    count = min(max_period, states.shape[-2] - 1)
+    apart = np.abs(states[..., -1:, :] - states[..., -1 - count : -1, :]).max(axis=-1)
+    return np.asarray(apart[..., ::-1])
+
+
+def return_period(states: np.ndarray, max_period: int, within: float = RECURRENCE.near_return) -> np.ndarray:
+    """The shortest period after which the last of the states (..., kept, d) has come back to within a distance; 0 if none has."""
+    near = return_distances(states, max_period) < within
+    if not near.shape[-1]:  # one state alone
+        return np.zeros(near.shape[:-1], dtype=int)
+    return np.where(near.any(axis=-1), 1 + np.argmax(near, axis=-1), 0)
+
+
+def nearest_return(states: np.ndarray, max_period: int) -> int:
+    """The period after which the last of the states (kept, d) is nearest to an earlier one."""
+    return 1 + int(np.argmin(return_distances(states, max_period)))
+
+
+def _read(result: EnsembleResult) -> Recurrence:
+    """The records of the motions; their outcomes are filled in later."""
+    last, samples = result.last, result.samples
+    assert result.periods is not None
+    columns = {kind: samples[kind][:, :, 0] if kind in samples else None for kind in (Sample.IMPACT_COUNT, Sample.SPEED)}
+    return Recurrence(
+        outcome=np.full(len(last), Outcome.MOVING, dtype=np.int8),
+        period=np.zeros(len(last), dtype=int),
+        periods=result.periods,
+        last=last,
+        states=samples.get(Sample.STATE, np.empty((len(last), 0, last.shape[1]))),
+        extrema=samples.get(Sample.EXTREMA),
+        impact_counts=columns[Sample.IMPACT_COUNT],
+        speeds=columns[Sample.SPEED],
+    )
+
+
+def _outcome(result: EnsembleResult, varied: bool) -> np.ndarray:
+    """The outcomes that do not follow from a period."""
+    outcome = np.full(len(result.stops), Outcome.MOVING, dtype=np.int8)
+    held = result.held & result.stopped(Stop.HORIZON, Stop.REST)
+    if held.any():
+        outcome[held] = Outcome.HELD if varied or not _rest_lasts(result.system) else Outcome.REST
+    outcome[result.stopped(Stop.CAPTURED)] = Outcome.REST
+    outcome[~result.stopped(Stop.HORIZON, Stop.REST, Stop.SETTLED, Stop.CAPTURED)] = Outcome.ENDED
+    return outcome
+
+
+def _rest_lasts(system: System) -> bool:
+    """Whether it is known that the load never pulls a system off its rest; with several contacts, each must hold one
+    coordinate."""
+    contacts, names = system.model.contacts, system.model.coordinates
+    known = not contacts or sorted(contact.coordinate for contact in contacts) == sorted(names)
+    known &= not system.model.frictions
+    return known and not load_releases(system)
+
+
+def _with_periods(found: Recurrence, compiled: Any, max_period: int, settings: RecurrenceSettings) -> Recurrence:
+    """The results with the periods that the compiled lanes have found, or that the kept states show."""
+    outcome, period = found.outcome.copy(), found.period.copy()
+    if compiled is None:
+        period[:] = return_period(found.states, max_period, settings.near_return)
+    else:
+        period[:] = np.where(compiled <= max_period, compiled, 0)
+        longer = found.unsettled & (period == 0) & (max_period > settings.compiled_max_period)
+        for row in np.flatnonzero(longer):
+            period[row] = _long_period(found.states[row], max_period, settings)
+    period[~found.unsettled] = 0
+    outcome[period > 0] = Outcome.PERIODIC
+    return replace(found, outcome=outcome, period=period)
+
+
+def _long_period(states: np.ndarray, max_period: int, settings: RecurrenceSettings) -> int:
+    """The period, longer than those that compiled lanes look for, with which the last states (kept, d) repeat; 0 without one."""
+    for q in range(settings.compiled_max_period + 1, min(max_period, len(states) // 2 - 1) + 1):
+        if np.abs(states[-q:] - states[-2 * q : -q]).max() < settings.long_agreement:
+            return q
+    return 0

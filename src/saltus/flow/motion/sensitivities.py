@@ -1,0 +1,257 @@
+"""Sensitivities: the derivatives of a motion to the state that it starts from and to parameters, impacts included."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from saltus.checks import check_names
+from saltus.flow.contacts.layout import ImpactDetail
+from saltus.flow.kernel.layout import GrazingDetail
+from saltus.flow.kernel.memory_layout import RestDetail
+from saltus.flow.kernel.structures import Program
+from saltus.flow.motion.dataset import state_names
+from saltus.flow.motion.motion import EventKind, Motion
+from saltus.flow.motion.request import MotionRequest
+from saltus.flow.motion.simulate import Followed, follow
+from saltus.flow.motion.stops import Stop
+from saltus.progress import Progress, silent
+from saltus.public_functions import Numbers
+from saltus.result import Result, result_dataset
+from saltus.systems import System, check_system, constrained_acceleration
+from saltus.taylor import FREQUENCY
+
+if TYPE_CHECKING:
+    import xarray
+
+IRREGULAR = {
+    ImpactDetail.NO_SPEED: "at time {time:.9g} a contact is reached without speed, where the motion has no derivative",
+    ImpactDetail.APART: (
+        "at time {time:.9g} contacts close together, which motions beside this one close one after the other, so that the "
+        "motion is not continuous in what moves them apart"
+    ),
+    ImpactDetail.ORDERED: (
+        "at time {time:.9g} contacts close together that do not act on one another, but what the motion does between two of them "
+        "depends on which comes first, so that there are only one-sided derivatives"
+    ),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivities(Result):
+    """The derivatives of a motion of n degrees of freedom; a state is (coordinates, velocities), 2 n numbers.
+
+    They hold for the motion that `simulate` returns for the same arguments. Its start is at a fixed `time`. Its end is at a fixed
+    time if a `duration` was asked for; after a number of `periods` it moves with the load's frequency, and at a margin with the
+    margin. A derivative is one-sided if the motion starts at a contact, is released by a jump of the load, ends on an event, or
+    grazes the contact (see `grazings`).
+
+    `event_times` has a row for each of `motion.events` and a column for each initial coordinate, initial velocity and
+    parameter: the derivatives of the event's time. They are nan if the event has none (a grazing, the beginning of chatter, or
+    impacts or releases of several contacts that are not simultaneous in neighbouring motions), and after the motion has lost its
+    derivative.
+
+    Attributes
+    ----------
+    motion
+        The motion.
+    state
+        The derivatives of the state at the end to the one at the start, (2 n, 2 n).
+    parameters
+        The derivatives of the state at the end to each parameter, (2 n, parameters).
+    parameter_paths
+        The dotted paths of the parameters.
+    event_times
+        The derivatives of the events' times, as above, (events, 2 n + parameters).
+    grazings
+        The times at which the motion touches the contact; motions that pass on the other side have other derivatives.
+    undefined
+        Why some or all derivatives at the end do not exist; these are nan.
+
+    Examples
+    --------
+    >>> result = saltus.sensitivities(system, theta=0.3, periods=2)
+    >>> float(result.determinant / np.exp(-0.1 * result.motion.time))  # with e = 1 areas shrink by the damping alone
+    1.0000000000001628
+    """
+
+    motion: Motion
+    state: np.ndarray
+    parameters: np.ndarray
+    parameter_paths: tuple[str, ...]
+    event_times: np.ndarray
+    grazings: np.ndarray
+    undefined: str | None
+
+    @property
+    def determinant(self) -> float:
+        """The determinant of `state`, by which the flow has scaled volumes of states; 0 after rest, nan where `state` is nan."""
+        return float(np.linalg.det(self.state)) if np.isfinite(self.state).all() else math.nan
+
+    def to_xarray(self) -> xarray.Dataset:
+        """`derivative` (state, to) of the state at the end, and `event_time_derivative` (event, to) of the events' times."""
+        system = self.motion.system
+        names = state_names(system.model.coordinates)
+        to = [*(f"start_{name}" for name in names), *self.parameter_paths]
+        columns: dict[str, tuple[Any, ...]] = {
+            "derivative": (("state", "to"), np.hstack([self.state, self.parameters]), "1", "of the state at the end"),
+            "event_time": ("event", [event.time for event in self.motion.events], "1", "times of the motion's events"),
+            "event_kind": ("event", [event.kind.value for event in self.motion.events], "1", "what they are"),
+            "event_time_derivative": (("event", "to"), self.event_times, "1", "of the events' times"),
+            "grazing_time": ("grazing", self.grazings, "1", "times at which the motion touches the contact"),
+        }
+        facts = {"end_time": self.motion.time, "undefined": self.undefined or ""}
+        return result_dataset("sensitivities", columns, {"state": list(names), "to": to}, system, tol=self.motion.tol, **facts)
+
+    def __repr__(self) -> str:
+        to = ", ".join(("state", *self.parameter_paths))
+        rest = f", undefined: {self.undefined}" if self.undefined else f", determinant={self.determinant:.6g}"
+        return f"Sensitivities(of {self.motion!r} to {to}{rest})"
+
+
+def sensitivities(
+    system: System,
+    *,
+    parameters: Iterable[str] = (),
+    velocity: Numbers = 0.0,
+    periods: float | None = None,
+    duration: float | None = None,
+    tol: float = 1e-12,
+    time: float = 0.0,
+    side: int | None = None,
+    stop_at: Iterable[str] = (),
+    dense: bool = True,
+    progress: Progress = silent,
+    **coordinates: float,
+) -> Sensitivities:
+    """The derivatives of an exact motion to its initial state and to parameters, with the saltation of every event.
+
+    Along an arc u = dq/dc obeys u'' = a_q u + a_v u' + a_c, which is expanded together with the motion, in the same steps. At an
+    impact v+ = R(v-, t, c) at the contact x(c), whose time has the derivative dt = (x_c - u-) / v-,
+
+        u+ = x_c - v+ dt,     u'+ = R_v (u'- + a_old dt) + R_t dt + R_c - a_new dt.
+
+    The determinant of this map is R_v v+ / v-. A release moves with the root of the contact acceleration; at rest the derivatives
+    are those of the contact's position. With several contacts the law of the acting contacts is differentiated (see
+    `contacts/tangent.py`).
+
+    Parameters
+    ----------
+    system
+        What moves.
+    parameters
+        Dotted paths of the numbers to differentiate to, such as "load.frequency", "impact.e".
+    velocity, periods, duration, tol, time, side, stop_at, dense, progress, coordinates
+        As for `simulate`.
+
+    Raises
+    ------
+    ParameterError
+        A path leads to no number (the message has similar paths), or another argument has no meaning.
+    MotionError
+        As for `simulate`.
+
+    Examples
+    --------
+    >>> ball = saltus.System(model=saltus.WallOscillator(stiffness=0.0, wall=0.0), load=saltus.Load(force=1.0))
+    >>> result = saltus.sensitivities(ball, x=-2.0, duration=3.0)
+    >>> float(result.event_times[0, 0])  # a fall from x = -h takes sqrt(2 h), with the derivative -1 / sqrt(2 h)
+    -0.5
+    """
+    paths = _paths(system, parameters)
+    request = MotionRequest(
+        system=system,
+        coordinates=coordinates,
+        velocity=velocity,
+        periods=periods,
+        duration=duration,
+        tol=tol,
+        time=time,
+        side=side,
+        stop_at=stop_at,
+        dense=dense,
+        sensitivities=paths,
+    )
+    return derivatives_of(request, None, progress)
+
+
+def derivatives_of(request: MotionRequest, run: Program | None, progress: Progress = silent) -> Sensitivities:
+    """`sensitivities` of a request, with its program if that is known."""
+    followed, paths = follow(request, progress, run), request.sensitivities or ()
+    motion, n = followed.motion, len(request.system.model.coordinates)
+    shift, columns = _end_shift(followed, paths, request.periods), followed.columns
+    if shift.any():
+        columns = columns + np.outer(state_rates(motion), shift)
+    return Sensitivities(
+        motion=motion,
+        state=columns[:, : 2 * n],
+        parameters=columns[:, 2 * n :],
+        parameter_paths=paths,
+        event_times=followed.shifts,
+        grazings=np.array([event.time for event in motion.events.of(EventKind.GRAZING)]),
+        undefined=_undefined(motion, columns),
+    )
+
+
+def _paths(system: System, parameters: Iterable[str]) -> tuple[str, ...]:
+    """The checked paths of the parameters to differentiate to."""
+    check_system(system, "sensitivities", several_contacts=True)
+    return check_names("parameters", parameters, "parameters, such as ['load.frequency']")
+
+
+def _end_shift(followed: Followed, paths: tuple[str, ...], periods: float | None) -> np.ndarray:
+    """The shift of the time at the end along each column: with the margin that ends the motion, or with the forcing period."""
+    motion, shift = followed.motion, np.zeros(followed.columns.shape[1])
+    if motion.stop is Stop.LIMIT:
+        return np.asarray(followed.shifts[-1])
+    if periods is not None and FREQUENCY in paths:
+        frequency = motion.system.load.frequency
+        assert frequency is not None
+        shift[followed.columns.shape[0] + paths.index(FREQUENCY)] = -2.0 * math.pi * periods / frequency**2
+    return shift
+
+
+def state_rates(motion: Motion) -> np.ndarray:
+    """The time derivative of the state at the end of a motion, (2 degrees of freedom,)."""
+    system, side = motion.system, motion.side
+    velocity = np.atleast_1d(motion.velocity)
+    if side == 0:
+        return np.zeros(2 * velocity.size)
+    acceleration: Any
+    if system.model.held:
+        held = {contact.coordinate for contact in system.model.contacts if contact.name in motion.closed}
+        slides = list(motion.sliding.values())
+        held |= {friction.coordinate for friction, s in zip(system.model.frictions, slides, strict=True) if s == 0}
+        free, q = [float(name not in held) for name in system.model.coordinates], motion.position
+        acceleration = constrained_acceleration(system.model, motion.time, q, motion.velocity, system.load, free, slides)
+    else:
+        acceleration = system.model.acceleration(motion.time, motion.position, motion.velocity, float(side), system.load)
+    return np.concatenate([velocity, np.atleast_1d(np.asarray(acceleration, dtype=float))])
+
+
+def _undefined(motion: Motion, columns: np.ndarray) -> str | None:
+    """Why some columns are nan: the last event at which the motion has lost its derivative; None if all are finite."""
+    if np.isfinite(columns).all():
+        return None
+    for event, detail in zip(reversed(motion.events), motion.events.details[::-1], strict=True):
+        if event.kind is EventKind.IMPACT and motion.system.model.contacts and detail != ImpactDetail.REGULAR:
+            return IRREGULAR[ImpactDetail(detail)].format(time=event.time)
+        if event.kind is EventKind.CHATTER:
+            return f"at time {event.time:.9g} impacts without loss became too small to be followed, and their phase is lost"
+        if event.kind is EventKind.GRAZING and detail == GrazingDetail.TRIPLE:
+            return f"at time {event.time:.9g} the motion meets the contact without speed, where it has no derivative"
+        if event.kind is EventKind.REST and detail == RestDetail.NEVER_AGAIN:
+            return (
+                f"from time {event.time:.9g} on it rests at contact and impacts lose nothing, so that a motion from a state "
+                "beside it never comes to rest: there is no derivative to what moves it off the contact"
+            )
+    if motion.system.model.contacts:
+        return (
+            "it starts with a closed contact whose impacts lose nothing, or a reaction reaches 0 without a rate, so that motions "
+            "beside it go another way"
+        )
+    return "the derivatives leave the range of numbers"

@@ -1,0 +1,219 @@
+"""Simulation: from a system and a state to a motion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from saltus.errors import MotionError
+from saltus.flow.contacts.state import ContactState
+from saltus.flow.kernel.layout import Mode, Setting, Status, Where
+from saltus.flow.kernel.memory_layout import State
+from saltus.flow.kernel.structures import Program, program
+from saltus.flow.motion.motion import Motion
+from saltus.flow.motion.recorder import MOST, Recorder
+from saltus.flow.motion.request import MotionRequest
+from saltus.flow.motion.stops import Stop
+from saltus.flow.one_contact.state import KernelState
+from saltus.progress import Progress, silent
+from saltus.public_functions import Numbers
+from saltus.systems import System
+
+WHAT = "following the motion"  # for the progress
+
+
+def simulate(
+    system: System,
+    *,
+    velocity: Numbers = 0.0,
+    periods: float | None = None,
+    duration: float | None = None,
+    tol: float = 1e-12,
+    time: float = 0.0,
+    side: int | None = None,
+    stop_at: Iterable[str] = (),
+    dense: bool = True,
+    times: Numbers | None = None,
+    progress: Progress = silent,
+    **coordinates: float,
+) -> Motion:
+    """The exact motion of a system from a state, event by event, by Taylor series.
+
+    Parameters
+    ----------
+    system
+        What moves.
+    velocity
+        The velocity at the start (a tuple where there are several coordinates, or 0 for all).
+    periods, duration
+        The length of the motion, either in forcing periods or in dimensionless time.
+    tol
+        The error that one step may make, relative to the state, in [1e-15, 1e-6].
+    time
+        The dimensionless time at the start.
+    side
+        The side, +1 or -1, to which the motion goes from rest at the contact if that is not unique.
+    stop_at
+        Margins of the model that end the motion, such as "kinematic_limit"; the model's own `stops` always do.
+    dense
+        Whether to keep the motion between the events; with False only the events are kept.
+    times
+        Times at which the states are kept in place of the whole motion, for motions that are too long to be kept whole.
+    progress
+        Called from time to time with the fraction done and what is being done.
+    coordinates
+        The state at the start by the model's names: theta=0.3, or x=0.0 for a wall oscillator.
+
+    Raises
+    ------
+    ParameterError
+        An argument has no meaning.
+    MotionError
+        The motion is not unique, an impact has no solution, or the numbers overflow; the message says at which time.
+
+    Examples
+    --------
+    >>> motion = saltus.simulate(system, theta=0.3, periods=20)
+    >>> f"{motion.theta:.12f} after {len(motion.impacts)} impacts"
+    '-0.235680595299 after 39 impacts'
+    """
+    request = MotionRequest(
+        system=system,
+        coordinates=coordinates,
+        velocity=velocity,
+        periods=periods,
+        duration=duration,
+        tol=tol,
+        time=time,
+        side=side,
+        stop_at=stop_at,
+        dense=dense,
+        times=times,
+    )
+    return follow(request, progress).motion
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A motion with its tangent at the end."""
+
+    motion: Motion
+    columns: np.ndarray  # (2 degrees of freedom, columns): of the coordinates, then of the velocities, at the end
+    shifts: np.ndarray  # (events, columns): the shift of each event
+
+
+def follow(request: MotionRequest, progress: Progress, run: Program | None = None) -> Followed:
+    """Follow the motion of a request, with its tangent if the request asks for one; `run` is its program, if that is known."""
+    run = run or program(request.system, request.limits, request.sensitivities)
+    now = (ContactState if request.system.model.held else KernelState).at_start(request, run)
+    recorder = Recorder(request, int(now.where[Where.ORDER]), int(now.where[Where.COLUMNS]))
+    status = _advance(request.system, run, now, recorder, progress)
+    return Followed(_collect(request, now, status, recorder), now.columns, recorder.event_shifts())
+
+
+def _advance(system: System, run: Program, now: KernelState, recorder: Recorder, progress: Progress) -> int:
+    """Call the kernel until the motion ends, emptying its buffers in between; returns why it ended."""
+    begin, end = now.time, now.end_time
+    many = MOST.burst if system.model.held else MOST.rate
+    checked_at, counted, unit = begin, 0, min(now.settings[Setting.LENGTH] or 1.0, 1.0) * many / MOST.rate
+    progress(0.0, WHAT)
+    while True:
+        status = now.advance(run, recorder.steps, recorder.events)
+        recorder.take(now.where)
+        time = now.time
+        if end > begin:
+            progress((time - begin) / (end - begin), WHAT)
+        if status not in (Status.FULL, Status.PAUSED):
+            _refuse(system, status, now)
+            return status
+        if recorder.total > counted + many:
+            if time < checked_at + unit:
+                raise MotionError(
+                    f"more than {many} impacts{_at_contacts(system, recorder)} from time {checked_at:.6g} to {time:.6g}: "
+                    f"{_why_so_many(system, recorder)}, or ask for a shorter time"
+                )
+            checked_at, counted = time, recorder.total
+        if recorder.total > MOST.events:
+            raise MotionError(
+                f"more than {MOST.events} impacts before time {time:.6g}, too many to be kept; ask for a shorter time, or use "
+                "simulate_many, which only counts them"
+            )
+
+
+def _at_contacts(system: System, recorder: Recorder) -> str:
+    """The contacts of the last impacts with their restitution, in words; empty for a model with one contact."""
+    if not system.model.contacts:
+        return ""
+    matrix, hit = system.impact.restitution_matrix(system.model), recorder.last_hit()
+    return " at " + " and ".join(f"{system.model.contacts[i].name!r} (e = {float(matrix[i][i]):g})" for i in hit)
+
+
+def _why_so_many(system: System, recorder: Recorder) -> str:
+    """Why impacts follow one another so fast, and what to change, in words."""
+    matrix = system.impact.restitution_matrix(system.model) if system.model.contacts else []
+    if any(float(matrix[i][i]) == 1.0 for i in (recorder.last_hit() if system.model.contacts else ())):
+        return (
+            "without a loss impacts on a contact that stays pressed never end, and with several contacts they are not averaged; "
+            "give them a loss, an e below 1"
+        )
+    return "they accumulate too slowly to be followed; raise the loss at impact"
+
+
+def _refuse(system: System, status: int, now: KernelState) -> None:
+    """Raise an error, with a sentence, for a status that is no regular end of a motion."""
+    at, velocity = f"at time {now.time:.9g}", now.velocity[0]
+    if status in (Status.NOT_UNIQUE, Status.NO_IMPACT) and system.model.held:
+        choice = "no choice of closed contacts, and of what sticks, is consistent"
+        what = choice if status == Status.NOT_UNIQUE else "the impact law has no solution"
+        raise MotionError(f"{what} {at}: the mass matrix is not positive definite there, or all but singular")
+    if status == Status.NOT_UNIQUE:
+        raise MotionError(
+            f"the motion from rest at contact {at} is not unique: the accelerations of both sides point away from it; "
+            "choose one with side=+1 or side=-1"
+        )
+    if status == Status.NO_IMPACT:
+        raise MotionError(
+            f"{system.impact!r} has no velocity after the impact {at} with velocity {velocity:.6g} before it: no value of the "
+            "sign that leads on meets the law (errata 26; VelocityReduction always has one), or the model's reset leads "
+            "back into the contact"
+        )
+    if status == Status.NOT_FINITE:
+        raise MotionError(
+            f"the motion leaves the range of numbers {at}; its velocity was last "
+            f"{velocity:.6g}; a number of the system may be too large, or a power or root of the model may have no Taylor series "
+            "there, such as abs(x)**1.5 at x = 0"
+        )
+    if status == Status.STALLED and not system.model.singularity:
+        raise MotionError(f"the steps shrink to nothing {at}: the acceleration is singular there, or far too large")
+
+
+def _collect(request: MotionRequest, now: KernelState, status: int, recorder: Recorder) -> Motion:
+    """The motion from the kernel's last state and its records."""
+    events, time, position, velocity = recorder.all_events(), now.time, now.position, now.velocity
+    mode, one, start = now.where[Where.MODE], now.position.size == 1, float(request.time)
+    stop, limit = (Stop.REST if mode == Mode.REST else Stop.HORIZON), None
+    if status == Status.LIMITED:
+        stop, limit = Stop.LIMIT, request.limits[events.details[-1]]
+    if status == Status.STALLED:
+        stop, limit = Stop.SINGULAR, request.system.model.singularity
+    samples = recorder.samples(time, position, velocity, now.side)
+    return Motion(
+        system=request.system,
+        tol=float(request.tol),
+        start=start,
+        time=time,
+        position=float(position[0]) if one else tuple(position.tolist()),
+        velocity=float(velocity[0]) if one else tuple(velocity.tolist()),
+        side=now.side,
+        stop=stop,
+        limit=limit,
+        chatter_speed=float(now.state[State.CHATTER_SPEED]) if mode == Mode.CHATTER else None,
+        periods=int(now.where[Where.PERIOD]),
+        events=events,
+        impacts=events.impacts(),
+        dense=recorder.dense(),
+        kept=samples,
+        sampled_validity=None if samples is None else recorder.validity(time - start),
+    )

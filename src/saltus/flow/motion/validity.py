@@ -1,0 +1,183 @@
+"""Validity of a motion: whether the real mechanism stays within its limits (errata 19, 20) and its assumptions (errata 21)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from saltus.flow.motion.dense_output import DenseOutput, evaluate
+from saltus.systems import System, energy_gain
+
+STEP_SAMPLES = 12  # samples in each step to find changes of sign; a step is shorter than the time scale of a margin
+GAIN_ROUNDING = 1e-12  # A smaller share by which an impact raises the energy is rounding.
+RIDDERS_ITERATIONS = 8  # of Ridders' method, each of which doubles the correct digits or at least halves the bracket
+
+
+@dataclass(frozen=True)
+class Validity:
+    """The validity of a motion: which margins of the model it passes, and for what share of the time.
+
+    Attributes
+    ----------
+    first
+        The dimensionless time at which each margin is first passed, or None.
+    share
+        The share of the motion's time that is spent beyond each margin.
+    gains
+        The contacts at which the impact law may raise the kinetic energy, and by what share of it (see `energy_gain`).
+
+    Examples
+    --------
+    >>> validity = saltus.simulate(system, theta=0.3, periods=1).validity
+    >>> validity.first["kinematic_limit"] is None  # never passed
+    True
+    """
+
+    first: dict[str, float | None]
+    share: dict[str, float]
+    gains: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def respected(self) -> bool:
+        """Whether every margin stays positive throughout, and no impact can gain energy."""
+        return not self.gains and all(time is None for time in self.first.values())
+
+    def __str__(self) -> str:
+        parts = [
+            f"{name} " + ("respected" if t is None else f"passed first at {t:.6g}, {100 * self.share[name]:.3g} % of the time")
+            for name, t in self.first.items()
+        ]
+        parts += [f"impacts at {name} {self.gain(name)}" for name in self.gains]
+        return "; ".join(parts) or "the model has no margins"
+
+    def gain(self, contact: str) -> str:
+        """A sentence about the energy that impacts may gain at a contact in `gains`.
+
+        Parameters
+        ----------
+        contact
+            Its name.
+        """
+        share = 100 * self.gains[contact]
+        return f"may raise the kinetic energy by {share:.3g} %: v+' M v+ > v-' M v- for v+ = -E v-; a smaller transfer would not"
+
+
+class ValidityCheck:
+    """Evaluates the model's margins along dense output, given in one piece or in several; their zeros are found to rounding.
+
+    A margin that is passed and regained within a twelfth of one step may be missed. Times of rest are left out.
+    """
+
+    def __init__(self, system: System) -> None:
+        self._system = system
+        side = (*system.model.sides, 1)[0]
+        state: Any = 0.0 if len(system.model.coordinates) == 1 else (0.0,) * len(system.model.coordinates)
+        names = system.model.margins(0.0, state, state, state, side, system.load)
+        self._first: dict[str, float | None] = dict.fromkeys(names)
+        self._beyond: dict[str, float] = dict.fromkeys(names, 0.0)
+
+    def add(self, dense: DenseOutput) -> None:
+        """Evaluate the margins along the next piece of dense output."""
+        moving = np.flatnonzero((dense.side != 0) & (dense.length > 0))
+        if not self._first or not moving.size:
+            return
+        step = np.repeat(moving, STEP_SAMPLES + 1)
+        tau = (dense.length[moving, None] * np.linspace(0.0, 1.0, STEP_SAMPLES + 1)).ravel()
+        for name, value in _margins(self._system, dense, tau, step, _grid(dense, moving)).items():
+            first, beyond = _beyond(self._system, dense, name, value, tau, step)
+            self._beyond[name] += beyond
+            if self._first[name] is None:
+                self._first[name] = first
+
+    def result(self, duration: float) -> Validity:
+        """The validity of a motion of this duration."""
+        model, shares = (
+            self._system.model,
+            {name: beyond / duration if duration else 0.0 for name, beyond in self._beyond.items()},
+        )
+        gains = energy_gain(model, self._system.impact) if model.contacts else {}
+        return Validity(dict(self._first), shares, {name: gain for name, gain in gains.items() if gain > GAIN_ROUNDING})
+
+
+def _beyond(
+    system: System, dense: DenseOutput, name: str, value: np.ndarray, tau: np.ndarray, step: np.ndarray
+) -> tuple[float | None, float]:
+    """The first time at which a margin is negative, and the total time for which it is, from its samples in every step."""
+    value = np.broadcast_to(value, tau.shape)
+    left, right = np.arange(value.size - 1), np.arange(1, value.size)
+    same = step[left] == step[right]
+    left, right = left[same], right[same]
+    out_left, out_right = value[left] < 0, value[right] < 0
+    spent = np.where(out_left & out_right, tau[right] - tau[left], 0.0)
+    starts = np.where(out_left, dense.start[step[left]] + tau[left], np.inf)
+    mixed = np.flatnonzero(out_left != out_right)
+    if mixed.size:
+        change = _sign_change(system, dense, name, value, tau, step, left[mixed], right[mixed])
+        spent[mixed] = np.where(out_left[mixed], change - tau[left[mixed]], tau[right[mixed]] - change)
+        starts[mixed] = np.where(out_left[mixed], starts[mixed], dense.start[step[left[mixed]]] + change)
+    first = starts.min() if starts.size else np.inf
+    return (float(first) if np.isfinite(first) else None), float(spent.sum())
+
+
+def _sign_change(
+    system: System,
+    dense: DenseOutput,
+    name: str,
+    value: np.ndarray,
+    tau: np.ndarray,
+    step: np.ndarray,
+    left: np.ndarray,
+    right: np.ndarray,
+) -> np.ndarray:
+    """The times at which a margin changes its sign between the samples `left` and `right`, by Ridders' method for all at once."""
+    low, high, at_low, at_high = tau[left], tau[right], value[left], value[right]
+    root = low
+    for _ in range(RIDDERS_ITERATIONS):
+        middle = 0.5 * (low + high)
+        at_middle = _margins(system, dense, middle, step[left])[name]
+        spread = np.sqrt(at_middle**2 - at_low * at_high)
+        shift = np.where(
+            spread > 0, (middle - low) * np.sign(at_low - at_high) * at_middle / np.where(spread > 0, spread, 1.0), 0.0
+        )
+        root = np.clip(middle + shift, low, high)
+        at_root = _margins(system, dense, root, step[left])[name]
+        for x, at_x in ((middle, at_middle), (root, at_root)):
+            inside, like_low = (x >= low) & (x <= high), (at_x < 0) == (at_low < 0)
+            low, at_low = np.where(inside & like_low, x, low), np.where(inside & like_low, at_x, at_low)
+            high, at_high = np.where(inside & ~like_low, x, high), np.where(inside & ~like_low, at_x, at_high)
+    return np.asarray(root)
+
+
+def _grid(dense: DenseOutput, moving: np.ndarray) -> list[np.ndarray]:
+    """Coordinates, velocities and accelerations at even times of every moving step: matrix products, for speed."""
+    coefficients, h = dense.series[moving], dense.length[moving]
+    fraction = np.linspace(0.0, 1.0, STEP_SAMPLES + 1)
+    state = []
+    for _ in range(3):
+        powers = np.arange(coefficients.shape[2])
+        values = (coefficients * h[:, None, None] ** powers) @ fraction ** powers[:, None]
+        state.append(values.transpose(1, 0, 2).reshape(values.shape[1], -1))
+        coefficients = coefficients[:, :, 1:] * powers[1:]
+    return state
+
+
+def _states(dense: DenseOutput, tau: np.ndarray, step: np.ndarray) -> list[np.ndarray]:
+    """Coordinates, velocities and accelerations at the times `tau` after the starts of the given steps."""
+    coefficients = dense.series[step]
+    state = []
+    for _ in range(3):
+        state.append(evaluate(coefficients, tau))
+        coefficients = coefficients[:, :, 1:] * np.arange(1, coefficients.shape[2])
+    return state
+
+
+def _margins(
+    system: System, dense: DenseOutput, tau: np.ndarray, step: np.ndarray, state: list[np.ndarray] | None = None
+) -> dict[str, Any]:
+    """The model's margins at the times `tau` after the starts of the given steps, from the steps' own series."""
+    theta, velocity, acceleration = _states(dense, tau, step) if state is None else state
+    if len(system.model.coordinates) == 1:
+        theta, velocity, acceleration = theta[0], velocity[0], acceleration[0]
+    return system.model.margins(dense.start[step] + tau, theta, velocity, acceleration, dense.side[step], system.load)

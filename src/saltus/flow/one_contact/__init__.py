@@ -1,0 +1,1 @@
+"""The motion of models with one contact: an arc, an impact, rest, accumulations of impacts and chatter."""
