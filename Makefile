@@ -8,7 +8,7 @@ BENCH_READY := $(VENV)/.ready-bench
 DOCS_READY := $(VENV)/.ready-docs
 INSTALL := $(PYTHON) -m pip --python $(BIN)/python install --quiet --no-compile
 # All cores compile to bytecode what pip would on one, without the packages' own tests, which are half of it.
-COMPILE := $(BIN)/python -m compileall -qq -j 0 -x '[/\\]tests[/\\]' $(VENV)/lib src || true
+COMPILE := $(BIN)/python -m compileall -qq -j 0 -x '[/\\]tests[/\\]' $(VENV)/lib src reproduction/src || true
 
 .PHONY: help reproduce test thorough release-check lint bench docs dist lock clean
 
@@ -35,7 +35,7 @@ thorough: $(TEST_READY)
 	$(BIN)/python -m pytest -m thorough
 
 release-check: $(TEST_READY)
-	$(BIN)/python -m saltus.paper.release_check
+	$(BIN)/python -m saltus_paper.release_check
 
 lint: $(TEST_READY)
 	$(BIN)/ruff check .
@@ -56,12 +56,12 @@ dist: $(READY)
 	$(BIN)/python release/try_wheel.py $(DIST)
 
 # Debian splits ensurepip off into python3-venv; pip can fill a bare environment from outside.
-$(READY): requirements.lock pyproject.toml
+$(READY): requirements.lock pyproject.toml reproduction/pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "saltus needs Python 3.11 or newer; try: make PYTHON=python3.12 ..." >&2; exit 2; }
 	@$(PYTHON) -m venv $(VENV) >/dev/null 2>&1 || $(PYTHON) -m venv --clear --without-pip $(VENV)
 	$(INSTALL) --require-hashes -r requirements.lock
-	$(INSTALL) --no-deps --no-build-isolation -e .
+	$(INSTALL) --no-deps --no-build-isolation -e . -e ./reproduction
 	@$(COMPILE)
 	@touch $@
 
@@ -87,7 +87,7 @@ $(DOCS_READY): $(READY) requirements-docs.lock
 lock:
 	$(PYTHON) -m venv $(VENV)/lock && $(VENV)/lock/bin/pip install --quiet uv
 	for extra in editable test bench docs; do \
-		$(VENV)/lock/bin/uv export --quiet --extra $$extra --no-emit-project --no-header --format requirements.txt -o requirements-$$extra.lock || exit; \
+		$(VENV)/lock/bin/uv export --quiet --all-packages --extra $$extra --no-emit-workspace --no-header --format requirements.txt -o requirements-$$extra.lock || exit; \
 	done
 	mv requirements-editable.lock requirements.lock
 	rm -rf $(VENV)/lock uv.lock

@@ -49,13 +49,12 @@ MAY_IMPORT = {
     "studies": {"systems", "theory", "flow", "continuation", "orbits", "attractors", "sweep"},
     "plots": set(),
     "config": {"systems", "flow", "attractors", "sweep", "studies"},
-    "paper": {"systems", "theory", "flow", "continuation", "orbits", "attractors", "sweep", "studies", "plots"},
-    "cli": {"systems", "theory", "flow", "taylor", "orbits", "attractors", "sweep", "studies", "plots", "config", "paper"},
+    "cli": {"systems", "theory", "flow", "taylor", "orbits", "attractors", "sweep", "studies", "plots", "config"},
 }
 TEXTS = {"saltus.taylor.lane_vectors", "saltus.taylor.records"}  # files whose text becomes a part of the lanes' kernels
 HEAVY = (
     *("scipy", "numba", "xarray", "matplotlib", "h5netcdf", "zarr", "distributed"),
-    *("saltus.flow", "saltus.sweep", "saltus.paper"),
+    *("saltus.flow", "saltus.sweep", "saltus_paper"),
 )
 LONGEST_FUNCTION, MEDIAN_FUNCTION, LONGEST_FILE = 60, 8, 400  # lines, docstrings included, but not their sections
 
@@ -181,8 +180,7 @@ def numbers_of(path: Path) -> Iterator[str]:
 
 
 def test_a_number_has_its_name_alone() -> None:
-    """Those of figures of the paper are read beside their figure only."""
-    names = [name for path in FILES if "paper" not in path.relative_to(SOURCE).parts for name in numbers_of(path)]
+    names = [name for path in FILES for name in numbers_of(path)]
     assert len(names) > 100
     same = {"MOST_STEPS"}  # of a segment with one contact and with several, which are compiled apart
     assert not {name for name in names if names.count(name) > 1} - same

@@ -169,7 +169,7 @@ def _default(value):
 
 def known_errata():
     """The errata 1 to 28 of the paper that were known; what follows was found while building saltus (docs/errata.md)."""
-    known = tomllib.loads((files("saltus.paper") / "errata.toml").read_text(encoding="utf-8"))
+    known = tomllib.loads((files("saltus_paper") / "errata.toml").read_text(encoding="utf-8"))
     lines = ["# The known errata of the paper, 1 to 28", "", "What is right, and why. Each is proved again by a test that is"]
     lines += ["called after it. From 29 on they are our own: [disagreements](../../errata.md).", ""]
     for number, erratum in known.items():

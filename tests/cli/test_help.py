@@ -11,7 +11,7 @@ import saltus as package
 HEAVY = ("numpy", "scipy", "numba", "xarray", "matplotlib")
 
 
-@pytest.mark.parametrize("command", ["simulate", "info", "reproduce"])
+@pytest.mark.parametrize("command", ["simulate", "info"])
 def test_every_command_shows_an_example(saltus, command):
     result = saltus(command, "--help")
     assert result.exit_code == 0
@@ -42,9 +42,7 @@ def test_help_imports_nothing_heavy():
     assert done.stdout.splitlines()[-1] == "heavy:"
 
 
-@pytest.mark.parametrize(
-    "arguments", [["simulte"], ["simulate"], ["simulate", "a.toml", "--outputs", "b"], ["reproduce", "--nope"]]
-)
+@pytest.mark.parametrize("arguments", [["simulte"], ["simulate"], ["simulate", "a.toml", "--outputs", "b"], ["info", "--nope"]])
 def test_wrong_use_ends_with_status_2(saltus, arguments):
     result = saltus(*arguments)
     assert result.exit_code == 2

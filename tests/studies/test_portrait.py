@@ -190,7 +190,7 @@ def test_undamped_separatrices_have_the_energy_of_their_saddle():
 
 
 def test_damped_separatrices_are_those_of_the_paper_module():
-    """`saltus.paper.figures.manifolds` integrates backward by SciPy, with events of its own."""
+    """`saltus_paper.figures.manifolds` integrates backward by SciPy, with events of its own."""
     system, data = steady(H=0.05), portrait(0.1, 0.05)
     saddles = [one for one in known_equilibria(system) if one.eigenvalues and not one.stable and abs(one.theta) < 2.5]
     compared = 0

@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from saltus.cli.added_commands import add_commands
 from saltus.cli.guard import guarded
 
 app = typer.Typer(
@@ -192,53 +193,7 @@ def doctor() -> None:
         print_doctor()
 
 
-@app.command()
-def reproduce(
-    names: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="NAMES", help="Parts of the paper, such as fig04 or table1; all if none is named."),
-    ] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="The folder to write to.")] = Path("results"),
-    force: Annotated[bool, typer.Option("--force", help="Make again what is up to date.")] = False,
-    list_: Annotated[bool, typer.Option("--list", help="List the parts and stop.")] = False,
-) -> None:
-    """Compute and draw the paper: figures, tables, and every claim beside the value found here.
-
-    Writes PNG, PDF and netCDF files, and report.html to open (report.pdf too,
-    where a browser is found that can print it). What is up to date is skipped.
-
-    Example: [cyan]saltus reproduce[/] for everything
-
-    Example: [cyan]saltus reproduce fig04 fig07[/] for two figures
-    """
-    with guarded():
-        from saltus.cli.reproduce_command import list_parts, reproduce_paper
-
-        if list_:
-            list_parts()
-        else:
-            reproduce_paper(names or [], output, force)
-
-
-@app.command()
-def report(
-    results: Annotated[Path, typer.Argument(metavar="FOLDER", help="The folder that `saltus reproduce` has written to.")] = Path(
-        "results"
-    ),
-) -> None:
-    """Write the report on the paper anew from results that are there; nothing is computed.
-
-    Writes report.html, claims.md and claims.json, and report.pdf where a
-    browser is found that can print it. Parts that other versions have made are
-    shown, and marked.
-
-    Example: [cyan]saltus report results[/]
-    """
-    with guarded():
-        from saltus.cli.reproduce_command import renew_report
-
-        renew_report(results)
-
+add_commands(app)
 
 # What numpy's libraries of linear algebra read when they are loaded. The matrices of saltus have some ten rows and its processes
 # use all cores: further threads only wait for one another, which took up to a third of the processor time of following orbits.

@@ -1,0 +1,90 @@
+"""From names to files: compute, draw and judge what is not up to date, then write the report."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from saltus.errors import ParameterError, near
+from saltus.files import check_writable, write_dataset, write_figure, write_text
+from saltus.plots import style
+from saltus.progress import Progress, silent
+from saltus_paper import up_to_date as state
+from saltus_paper.claims.claim import Claim
+from saltus_paper.figures.figure import PaperFigure
+from saltus_paper.panel_work import compute_panels
+from saltus_paper.report.report import write_report
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MadeFigure:
+    """The result for one name: its files, its claims, and whether it was made anew."""
+
+    name: str
+    made: bool  # False: it was up to date
+    seconds: float  # of processor time, of all cores together; 0 if it was up to date
+    files: tuple[Path, ...]
+    claims: tuple[Claim, ...]
+
+
+def reproduce(
+    names: Sequence[str] = (), output: Path | str = Path("results"), force: bool = False, progress: Progress = silent
+) -> list[MadeFigure]:
+    """Compute and draw the named parts of the paper (all if none is named) into `output`, and write the report.
+
+    What is up to date is left alone unless `force`. An interrupt leaves complete files only, and the next run goes on from there.
+
+    Raises
+    ------
+    ParameterError
+        An unknown name (the error gives similar ones); an output folder that cannot be written to.
+    """
+    from saltus_paper.parts import FIGURES, ORDER
+
+    for name in names:
+        if name not in FIGURES:
+            raise ParameterError(f"no part of the paper is called {name!r}; {near(name, FIGURES)}")
+    output = Path(output)
+    check_writable(output)
+    chosen = [figure for name, figure in FIGURES.items() if not names or name in names]
+    stale = {figure.name: figure for figure in chosen if force or not state.up_to_date(figure, output)}
+    seconds = _make({name: stale[name] for name in dict.fromkeys((*ORDER, *stale)) if name in stale}, output, progress)
+    progress(1.0, "writing the report")
+    results = [_result(figure, output, seconds) for figure in chosen]
+    write_report(FIGURES.values(), output, {result.name: result.claims for result in results})
+    return results
+
+
+def _make(figures: Mapping[str, PaperFigure], output: Path, progress: Progress) -> dict[str, float]:
+    """Compute, draw and judge these parts, begun in their order; returns their seconds."""
+    seconds: dict[str, float] = {}
+    progress(0.0, f"computing {len(figures)} parts")
+    for name, made, computing in compute_panels({name: figure.panels(**figure.parameters) for name, figure in figures.items()}):
+        figure, start = figures[name], time.process_time()
+        data = figure.join(made)
+        _write(figure, data, output)
+        # The data are taken from memory; tests show that reading the file gives the same.
+        claims = figure.claims(data)
+        seconds[name] = computing + time.process_time() - start
+        state.write(figure, output, claims, seconds[name])
+        progress(len(seconds) / len(figures), f"{name}, {figure.title}")
+    return seconds
+
+
+def _result(figure: PaperFigure, output: Path, seconds: Mapping[str, float]) -> MadeFigure:
+    files = tuple(output / name for name in figure.files())
+    made, claims = figure.name in seconds, tuple(state.claims(figure, output))
+    return MadeFigure(name=figure.name, made=made, seconds=seconds.get(figure.name, 0.0), files=files, claims=claims)
+
+
+def _write(figure: PaperFigure, data: Any, output: Path) -> None:
+    write_dataset(output / f"{figure.name}.nc", data)
+    if figure.table is not None:
+        write_text(output / f"{figure.name}.md", figure.table(data))
+    if figure.draw is not None:
+        picture = figure.draw(data)
+        with style():
+            write_figure(output / figure.name, picture, figure.title)

@@ -1,0 +1,81 @@
+"""`saltus reproduce`: the names, the options, and what is refused."""
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+
+def test_the_parts_are_listed(saltus):
+    from saltus_paper import FIGURES
+
+    listed = [line.split()[0] for line in saltus("reproduce", "--list").stdout.splitlines()]
+    assert listed == list(FIGURES)
+    assert {"fig04", "table1"} <= set(listed)
+
+
+@pytest.mark.parametrize("command", ["reproduce", "report"])
+def test_the_commands_show_an_example(saltus, command):
+    result = saltus(command, "--help")
+    assert result.exit_code == 0
+    assert f"Example: saltus {command}" in result.stdout
+
+
+def test_wrong_use_ends_with_status_2(saltus):
+    result = saltus("reproduce", "--nope")
+    assert result.exit_code == 2
+    assert "Usage: saltus reproduce" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "names", "output", "force"),
+    [
+        ([], [], Path("results"), False),
+        (["fig04", "table1", "-o", "there", "--force"], ["fig04", "table1"], Path("there"), True),
+    ],
+)
+def test_the_options_reach_the_paper(saltus, monkeypatch, arguments, names, output, force):
+    calls = []
+    monkeypatch.setattr("saltus_paper.reproduce", lambda *given: calls.append(given) or [])
+    monkeypatch.setattr("saltus_paper.report_as_pdf", lambda folder: None)
+    assert saltus("reproduce", *arguments).exit_code == 0
+    assert calls[0][:3] == (names, output, force)
+
+
+def test_an_unknown_part_is_refused(refused, tmp_path):
+    said = refused("reproduce", "fig4", "-o", tmp_path)
+    assert "did you mean" in said
+    assert "'fig04'" in said
+
+
+def test_an_unwritable_folder_is_refused(refused, tmp_path):
+    (tmp_path / "file").touch()
+    assert "is a file; name another with --output" in refused("reproduce", "fig08", "-o", tmp_path / "file")
+
+
+def test_the_report_of_no_results_is_refused(refused, tmp_path):
+    assert "holds no results of `saltus reproduce`" in refused("report", tmp_path)
+
+
+def test_the_report_is_renewed_and_a_missing_browser_told(saltus, monkeypatch, tmp_path):
+    monkeypatch.setattr("saltus_paper.report.browser.BROWSERS", ())
+    assert "there is no report.pdf" in saltus("reproduce", "table1", "-o", tmp_path).stdout
+    (tmp_path / "report.html").unlink()
+    assert "Parts in the report: table1" in saltus("report", tmp_path).stdout
+    assert (tmp_path / "report.html").exists()
+
+
+def test_an_interrupt_leaves_whole_files_only(started, tmp_path):
+    command = [sys.executable, "-m", "saltus", "reproduce", "fig04", "fig05", "-o", tmp_path]
+    process = started(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    while process.stderr.readline() != "paper: fig05\n":
+        assert process.poll() is None
+    process.send_signal(signal.SIGINT)  # fig05 is made, and while fig04, which takes seconds, is being made
+    _, err = process.communicate(timeout=120)
+    *_, said = err.splitlines()
+    assert (process.returncode, said) == (130, "saltus: interrupted; no file was left half-written")
+    files = [path for path in tmp_path.rglob("*") if path.is_file()]
+    assert any("fig05" in path.name for path in files)
+    assert not [path for path in files if ".part" in path.name]
