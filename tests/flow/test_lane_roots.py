@@ -53,7 +53,7 @@ def find(m, at, order):
 @njit(types.void(types.float64[::1], types.int64[::1], types.int64), **OPTIONS)
 def find_short(m, at, order):
     h, sign, start = load(m, STEP), load(m, SIGN), load(m, 0)
-    _, _, _, bend = sweep(m, at, 0, order, start, h)
+    _, _, _, bend = sweep(m, at, 0, order, h)
     square = h * h
     cubic = sign * start, sign * load(m, 1) * h, sign * load(m, 2) * square, sign * load(m, 3) * (square * h)
     certain, flight = short_flight(cubic, bend)

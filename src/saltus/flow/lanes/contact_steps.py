@@ -60,9 +60,10 @@ def first_closing(sizes, at, m, h, alive, helpers, space):
         if opened == 0:
             continue
         start = load(m, at[LanePart.POSITION] + row) - load(m, at[LanePart.CONTACTS] + i)
-        x, v, a, bend = sweep(m, at, row, order, start, h)
+        mean, v, a, bend = sweep(m, at, row, order, h)
+        end = fma(mean, h, start), v, a
         sign, skip = splat(1.0 * sizes[Size.CONTACTS + 1 + count + i]), bits(start * start <= 0.0)
-        closes, unclear, _, when, _ = meet(at, row, m, order, h, sign, start, (x, v, a), bend, skip, opened, 0, helpers, space)
+        closes, unclear, _, when, _ = meet(at, row, m, order, h, sign, start, end, bend, skip, opened, 0, helpers, space)
         doubtful |= unclear | (hit & closes & bits(absolute(when - tau) < TOGETHER * h))
         first = closes & (~hit | bits(when < tau))
         tau, which = select(mask(first), when, tau), select(mask(first), splat(1.0 * i), which)
@@ -110,7 +111,7 @@ def free_step(code, sizes, at, m, settings, limits, alive, helpers, space):
         sound &= series_true(code, m, at, sizes, settings[LaneSetting.TOLERANCE], tau, size)
     bend = splat(0.0)
     if sizes[Size.EXTREMA] > 0:
-        _, _, _, bend = sweep(m, at, 0, order, load(m, at[LanePart.POSITION]), h)
+        _, _, _, bend = sweep(m, at, 0, order, h)
     return hit, sound, h, tau, bend, which
 
 
@@ -152,9 +153,9 @@ def one_free_step(code, sizes, at, m, settings, limits, alive, helpers, space):
     now, limit = load(m, Slot.NOW), load(m, Slot.STEP_LIMIT)
     h, start = minimum(natural, limit - now), x - contact
     sound = bits(natural > settings[LaneSetting.SHORTEST_STEP]) & bits(size < FAST)
-    x, v, a, bend = sweep(m, at, 0, order, start, h)
+    mean, v, a, bend = sweep(m, at, 0, order, h)
     skip = bits(start * start <= 0.0)
-    end, ready = (x, v, a), alive & sound
+    end, ready = (fma(mean, h, start), v, a), alive & sound
     hit, doubtful, _, tau, at_root = meet(at, 0, m, order, h, sign, start, end, bend, skip, ready, 0, helpers, space)
     sound &= ~doubtful
     for i in range(sizes[Size.GUARDS]):
@@ -167,7 +168,7 @@ def one_free_step(code, sizes, at, m, settings, limits, alive, helpers, space):
     for i in range(sizes[Size.CONSTANT_GUARDS]):
         sound &= bits(load(m, at[LanePart.CONSTANT_GUARDS] + i) > 0.0)
     closing = mask(hit)
-    x, v = select(closing, contact, x + contact), select(closing, at_root, v)
+    x, v = select(closing, contact, fma(mean, h, x)), select(closing, at_root, v)
     for row in range(sizes[Size.OWN]):
         free = mask(bits(load(m, at[LanePart.FREE] + row) > 0.5))
         store(m, at[LanePart.NEW_POSITION] + row, select(free, x, load(m, at[LanePart.POSITION] + row)))

@@ -134,11 +134,12 @@ def upper_half(m, series, order, log_size, log_tol):
 
 
 @inline_jit
-def sweep(m, at, row, order, start, h):
-    """Position (with `start` as its value at 0), velocity and acceleration of a coordinate at h, and B = h^2 sum_{j>=2} abs(a_j)
-    h^j.
+def sweep(m, at, row, order, h):
+    """The mean velocity of a coordinate over [0, h], its velocity and acceleration at h, and B = h^2 sum_{j>=2} abs(a_j) h^j.
 
-    B bounds the difference between the second derivative in u = t/h and that of the cubic q_0 + ... + q_3 h^3 u^3.
+    From the mean velocity follow both the coordinate at h and its distance from a contact, each with all of its digits: one from
+    the other would lose them where the contact is far away, or near. B bounds the difference between the second derivative in
+    u = t/h and that of the cubic q_0 + ... + q_3 h^3 u^3.
     """
     before = row * SERIES_LENGTH
     positions, velocities = at[LanePart.POSITIONS] + before, at[LanePart.VELOCITIES] + before
@@ -152,7 +153,7 @@ def sweep(m, at, row, order, start, h):
         a, bend = fma(a, h, coefficient), fma(bend, h, absolute(coefficient))
     x, v, a = fma(x, h, load(m, positions + 1)), fma(v, h, load(m, velocities + 1)), fma(a, h, load(m, accelerations + 1))
     square = h * h
-    return fma(x, h, start), fma(v, h, load(m, velocities)), fma(a, h, load(m, accelerations)), bend * (square * square)
+    return x, fma(v, h, load(m, velocities)), fma(a, h, load(m, accelerations)), bend * (square * square)
 
 
 @inline_jit

@@ -134,7 +134,7 @@ def record_others(m, at, sizes, h, past, end, chosen, helpers, poly, series):
     end."""
     since, order = load(m, Slot.PERIOD_END) - load(m, Slot.NOW), sizes[Size.ORDER]
     for row in range(1, sizes[Size.OWN]):
-        _, _, _, bend = sweep(m, at, row, order, load(m, at[LanePart.POSITION] + row), h)
+        _, _, _, bend = sweep(m, at, row, order, h)
         begin = select(mask(past), since, splat(0.0))
         v_begin = select(mask(past), load(m, at[LanePart.ENDED_VELOCITY] + row), load(m, at[LanePart.VELOCITY] + row))
         x, v = load(m, at[LanePart.NEW_POSITION] + row), load(m, at[LanePart.NEW_VELOCITY] + row)
@@ -161,7 +161,7 @@ def pass_ends(m, at, sizes, h, bend, past, helpers, poly, series):
         record_range(m, at, 0, sizes, h, bend, splat(0.0), v_begin, since, x, v, past, helpers, poly, series)
         for row in range(1, sizes[Size.OWN]):
             q, w = load(m, at[LanePart.ENDED_POSITION] + row), load(m, at[LanePart.ENDED_VELOCITY] + row)
-            w_begin, (_, _, _, bent) = load(m, at[LanePart.VELOCITY] + row), sweep(m, at, row, order, q, h)
+            w_begin, (_, _, _, bent) = load(m, at[LanePart.VELOCITY] + row), sweep(m, at, row, order, h)
             record_range(m, at, row, sizes, h, bent, splat(0.0), w_begin, since, q, w, past, helpers, poly, series)
     keep_ended(m, at, sizes, past)
 

@@ -27,6 +27,7 @@ from saltus.taylor import (
     WIDTH,
     absolute,
     bits,
+    fma,
     inline_jit,
     jit,
     lean_jit,
@@ -93,15 +94,15 @@ def propose(code, sizes, at, m, flags, settings, limits, helpers, space):
     h = minimum(natural, limit - now)
     alive = flags[Flag.BUSY] & ~flags[Flag.SCALAR]
     sound = bits(natural > settings[LaneSetting.SHORTEST_STEP]) & bits(size < FAST)
-    contact = load(m, Slot.CONTACT)
-    start = load(m, at[LanePart.POSITION]) - contact  # measured from the contact, so that a small gap keeps its digits
-    x, v, a, bend = sweep(m, at, 0, order, start, h)
+    contact, position = load(m, Slot.CONTACT), load(m, at[LanePart.POSITION])
+    mean, v, a, bend = sweep(m, at, 0, order, h)
     if sizes[Size.MARGINS] > 0:
         sound &= margins_certain(m, at, sizes, h)
     hit, waits, tau, at_root = 0, 0, h, v
     if sizes[Size.SIDES] > 0:
         sign = select(mask(bits(rate_on(m, Slot.SIDE) > 0.0)), splat(1.0), splat(-1.0))  # a root depends on these numbers alone
-        end, skip = (x, v, a), flags[Flag.AT_CONTACT]
+        start = position - contact  # measured from the contact, so that a small gap keeps its digits
+        end, skip = (fma(mean, h, start), v, a), flags[Flag.AT_CONTACT]
         patient = bits(share > SMALLEST_SHARE)
         hit, doubtful, waits, tau, at_root = meet(
             at, 0, m, order, h, sign, start, end, bend, skip, alive & sound, patient, helpers, space
@@ -109,7 +110,7 @@ def propose(code, sizes, at, m, flags, settings, limits, helpers, space):
         sound &= ~doubtful
     impact = mask(hit)
     store(m, Slot.NEW_TIME, select(mask(bits(natural >= limit - now) & ~hit), limit, now + tau))
-    store(m, at[LanePart.NEW_POSITION], select(impact, contact, x + contact))
+    store(m, at[LanePart.NEW_POSITION], select(impact, contact, fma(mean, h, position)))
     store(m, at[LanePart.NEW_VELOCITY], select(impact, at_root, v))
     for row in range(1, row_count(at)):
         positions, velocities = at[LanePart.POSITIONS] + row * SERIES_LENGTH, at[LanePart.VELOCITIES] + row * SERIES_LENGTH
