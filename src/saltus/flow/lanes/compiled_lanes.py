@@ -11,6 +11,7 @@ from typing import Any
 
 from saltus.flow.contacts import complementarity, solver_memory
 from saltus.flow.contacts import impacts as contact_impacts
+from saltus.flow.contacts import lane_step as several_contacts
 from saltus.flow.contacts import layout as contact_layout
 from saltus.flow.kernel import function_types as scalar_types
 from saltus.flow.kernel import layout as kernel_layout
@@ -78,6 +79,7 @@ def _driver_text(several: bool) -> str:
         contacts_of_lane,
         contact_steps,
         lane_impacts,
+        several_contacts,
     )
     step = of_several if several else (one_contact,)
     common = (memory_layout, kernel_layout, lane_layout, contact_side, records, lane_steps, meeting, sampling)
