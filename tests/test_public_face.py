@@ -310,7 +310,7 @@ def alone(monkeypatch, tmp_path):
     """A folder of one's own, and nothing is computed."""
     from saltus.flow.lanes import ensemble
     from saltus.flow.motion import simulate as simulation
-    from saltus.orbits import problem
+    from saltus.orbits.equations import one_contact
 
     def begun(*_, **__):
         raise Computed
@@ -318,7 +318,7 @@ def alone(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(simulation, "follow", begun)
     monkeypatch.setattr(ensemble, "compile_driver_aside", begun)
-    monkeypatch.setattr(problem.Problem, "evaluate", begun)
+    monkeypatch.setattr(one_contact.OneContactEquations, "evaluate", begun)
 
 
 def answer(function, named):

@@ -31,14 +31,14 @@ def nothing_is_computed(monkeypatch):
     """Every motion ends the case, before it begins."""
     from saltus.flow.lanes import ensemble
     from saltus.flow.motion import simulate as simulation
-    from saltus.orbits import problem
+    from saltus.orbits.equations import one_contact
 
     def begun(*_, **__):
         raise Computed
 
     monkeypatch.setattr(simulation, "follow", begun)
     monkeypatch.setattr(ensemble, "compile_driver_aside", begun)
-    monkeypatch.setattr(problem.Problem, "evaluate", begun)
+    monkeypatch.setattr(one_contact.OneContactEquations, "evaluate", begun)
 
 
 def answer(case: int, ask, *given, **named) -> str | None:

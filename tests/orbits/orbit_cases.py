@@ -10,7 +10,7 @@ from saltus import (
     System,
     find_orbit,
 )
-from saltus.orbits.problem import Problem
+from saltus.orbits.equations.one_contact import OneContactEquations
 from saltus.orbits.signature import Signature
 
 FREQUENCY = "load.frequency"
@@ -35,7 +35,7 @@ def random_guess(rng: np.random.Generator, system: System, paths: tuple[str, ...
     """A problem and unknowns that solve nothing: the equations are smooth there as well. The last segment runs back in time."""
     both = len(system.model.sides) == 2
     sides = tuple((-1) ** i if both else 1 for i in range(impacts))
-    problem = Problem(system, Signature(sides, periods), paths)
+    problem = OneContactEquations(system, Signature(sides, periods), paths)
     phases = np.sort(rng.uniform(0.0, 2.4 * math.pi * periods, impacts))
     return problem, np.stack([phases, rng.uniform(0.2, 0.9, impacts)], axis=1).ravel()
 

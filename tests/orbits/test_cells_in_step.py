@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import saltus
-from saltus.orbits import near_returns, same_orbit
+from saltus.orbits import same_orbit
+from saltus.orbits.finding import near_returns
 from saltus.studies.diagram.placement import PlacedBranch, placed
 from saltus.studies.diagram.simulated import simulate_from
 

@@ -98,7 +98,7 @@ def test_orbits_repeat_and_have_the_multipliers_of_their_motions(orbit):
 
 def test_the_equations_have_the_derivatives_of_their_differences(orbit):
     paths = ("load.frequency", "impact.transfer", H if "theta_1" in orbit.system.model.coordinates else "load.force.amplitude")
-    problem = type(orbit.problem)(orbit.system, orbit.signature, paths)
+    problem = type(orbit.equations)(orbit.system, orbit.signature, paths)
     place = np.append(orbit.solution.unknowns, problem.values) + 1e-3 * np.random.default_rng(1).normal(size=problem.size + 3)
     place[-2] = 0.5
 

@@ -8,7 +8,7 @@ from soft_stops import soft_stop, variational_map
 
 import saltus
 from saltus.errors import ParameterError
-from saltus.orbits.special_point import SpecialKind
+from saltus.orbits.branches.special_point import SpecialKind
 
 FREQUENCY = "load.frequency"
 CASES = {
@@ -170,7 +170,7 @@ def test_a_torus_is_born_where_areas_may_grow():
 
 
 def test_a_pair_beyond_the_circle_where_areas_never_grow_is_reported_as_missed(monkeypatch):
-    from saltus.orbits import branch_events
+    from saltus.orbits.branches import branch_events
 
     monkeypatch.setattr(branch_events, "complex_pair", lambda orbit: 1.01)
     system = soft_stop(amplitude=0.05, frequency=0.5)

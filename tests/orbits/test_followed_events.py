@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 import saltus
 from saltus.orbits import OrbitEnd, solved_near
-from saltus.orbits.followed_problem import FollowedProblem
+from saltus.orbits.equations.whole_motion import WholeMotionEquations
 
 
 def belt(frequency: float, amplitude: float = 1.0, **numbers: float) -> saltus.System:
@@ -238,8 +238,8 @@ def test_the_section_lies_in_the_middle_of_the_longest_time_between_events(bounc
 
 def test_a_state_beside_a_section_at_which_a_layer_is_held_has_events(bouncing: saltus.PeriodicOrbit) -> None:
     """A layer that is open by a little comes to rest by impacts as the first events of all: their list could not be read."""
-    problem, unknowns = bouncing.problem, bouncing.solution.unknowns
-    assert isinstance(problem, FollowedProblem)
+    problem, unknowns = bouncing.equations, bouncing.solution.unknowns
+    assert isinstance(problem, WholeMotionEquations)
     held = problem.held(unknowns, bouncing.system)
     assert len(held) == 2  # a coordinate and its velocity
     for place in held:

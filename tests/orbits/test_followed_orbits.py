@@ -11,8 +11,8 @@ import pytest
 
 import saltus
 from saltus.orbits import solved_near
-from saltus.orbits.followed_problem import FollowedProblem
-from saltus.orbits.images import nearest
+from saltus.orbits.branches.images import nearest
+from saltus.orbits.equations.whole_motion import WholeMotionEquations
 
 
 def rubbed(frequency: float = 0.7, friction: float = 0.2, **numbers: float) -> saltus.System:
@@ -64,11 +64,11 @@ def test_multipliers_are_those_of_differences() -> None:
 
 def test_its_derivative_to_a_parameter_is_that_of_the_closed_form(branch: saltus.Branch) -> None:
     """The tangent of the branch, between neighbouring points, and frequency with a section that stays at its phase."""
-    problem = branch.orbits[len(branch.orbits) // 2].problem
+    problem = branch.orbits[len(branch.orbits) // 2].equations
     orbit = branch.orbits[len(branch.orbits) // 2]
     unknowns, value, step = orbit.solution.unknowns, orbit.solution.values, 1e-6
     ahead, behind = (problem.evaluate(unknowns, value + s * step).residual for s in (1, -1))
-    assert np.abs((ahead - behind) / (2 * step) - orbit.solution.equations.parameters[:, 0]).max() < 1e-6
+    assert np.abs((ahead - behind) / (2 * step) - orbit.solution.evaluation.parameters[:, 0]).max() < 1e-6
 
 
 def test_an_orbit_whose_motion_cannot_be_followed_is_not_confirmed(
@@ -169,8 +169,8 @@ def beside_an_event(orbit: saltus.PeriodicOrbit) -> saltus.PeriodicOrbit:
     longest = int(np.argmax(np.diff(times)))
     time = times[longest] + 0.979 * np.diff(times)[longest]
     phase, state = time * orbit.frequency % (2 * pi), np.concatenate(orbit.motion().at(time))
-    problem, values = orbit.problem, orbit.solution.values
-    assert isinstance(problem, FollowedProblem)
+    problem, values = orbit.equations, orbit.solution.values
+    assert isinstance(problem, WholeMotionEquations)
     found = saltus.PeriodicOrbit.near(problem.with_signature(replace(orbit.signature, section=phase)), state, values)
     assert found is not None
     return found

@@ -30,9 +30,9 @@ def assert_same(branch, back):
     for one, other in zip(branch.points, back.points, strict=True):
         np.testing.assert_array_equal(one.place, other.place)
         np.testing.assert_array_equal(one.tangent, other.tangent)
-        for name, values in vars(one.orbit.solution.equations).items():
+        for name, values in vars(one.orbit.solution.evaluation).items():
             if not name.startswith("_"):
-                np.testing.assert_array_equal(values, getattr(other.orbit.solution.equations, name))
+                np.testing.assert_array_equal(values, getattr(other.orbit.solution.evaluation, name))
     joined = [[each.is_joined(i) for i in range(len(each.points) - 1)] for each in (branch, back)]
     assert joined[0] == joined[1]
     xr.testing.assert_identical(branch.to_xarray(), back.to_xarray())

@@ -26,7 +26,7 @@ from saltus import (
 from saltus.errors import MotionError
 from saltus.flow import EventKind, contact_pull, load_releases
 from saltus.orbits import Branch, OrbitEnd
-from saltus.orbits.resting import RestingOrbit
+from saltus.orbits.equations.resting import RestingOrbit
 
 HCR = 0.5 / math.tan(BETA80)  # abs(V / tan(beta0)), from which on a horizontal load releases the mass from rest
 HHAT, ZETA, AMPLITUDE = "load.horizontal.amplitude", "load.ground_horizontal.amplitude", "load.force.amplitude"

@@ -11,7 +11,7 @@ from shared_systems import hinged, paired, walled
 from saltus import simulate
 from saltus.flow import SegmentColumn, SegmentValue
 from saltus.flow.one_contact.segments import SHORT
-from saltus.orbits.problem import Problem, Segments
+from saltus.orbits.equations.one_contact import OneContactEquations, Segments
 from saltus.orbits.signature import Signature
 from saltus.systems import Harmonic, Load, Model, System, VelocityReduction
 
@@ -27,7 +27,7 @@ def at_impacts(name):
     assert len(impacts) >= 4
     count = min(8, len(impacts) // 2 * 2)
     sides = tuple(int(s) for s in impacts.side[:count])
-    problem = Problem(system, Signature(sides, 1), paths)
+    problem = OneContactEquations(system, Signature(sides, 1), paths)
     phases, speeds = impacts.time[:count] * system.load.frequency, np.abs(impacts.velocity_before[:count])
     return motion, problem, np.stack([phases, speeds], axis=1).ravel()
 
@@ -72,7 +72,7 @@ def one_segment(name, begin, duration, speed=0.6):
     """A problem of two segments, of which the first goes from phase `begin` over `duration`; the function of its length."""
     system, paths = CASES[name]
     both = len(system.model.sides) == 2
-    problem = Problem(system, Signature((1, -1) if both else (1, 1), 1), paths)
+    problem = OneContactEquations(system, Signature((1, -1) if both else (1, 1), 1), paths)
     return problem, np.array([begin, speed, begin + duration, 0.4])
 
 
@@ -118,7 +118,7 @@ def test_derivatives_do_not_jump_where_the_short_segments_begin(name):
 def test_a_segment_there_and_back_ends_where_it_began():
     """Backwards in time from the end of a smooth motion, on either side and through the contact."""
     system = hinged(edge=0.4)
-    problem = Problem(system, Signature((), 1, False, -1), ("load.frequency", "model.edge", "impact.e"))
+    problem = OneContactEquations(system, Signature((), 1, False, -1), ("load.frequency", "model.edge", "impact.e"))
     state = np.array([-0.7, 1.1])
     there = problem.carried(state, 0.5, 9.0, problem.values)
     back = problem.carried(there, 9.0, 0.5, problem.values)
@@ -137,7 +137,7 @@ SMOOTH = {
 @pytest.mark.parametrize("periods", [1, 3])
 def test_derivatives_of_shooting_without_impacts(name, periods):
     system, paths, state = SMOOTH[name]
-    problem = Problem(system, Signature((), periods, False, 1), paths)
+    problem = OneContactEquations(system, Signature((), periods, False, 1), paths)
     found, values = problem.evaluate(state, problem.values), problem.values
     for j in range(state.size):
         expected = slope(lambda y: problem.evaluate(y, values).residual, state, j)
@@ -166,7 +166,7 @@ class SteepBelow(Model):
 def test_steps_of_a_segment_are_checked_with_the_equation_of_its_own_side(side, start):
     """Of a force that bends too sharply for a series from afar, against DOP853 with short steps."""
     load = Load(frequency=1.0, force=Harmonic(0.2))
-    problem = Problem(System(model=SteepBelow(), load=load, impact=VelocityReduction(0.9)), Signature((), 1))
+    problem = OneContactEquations(System(model=SteepBelow(), load=load, impact=VelocityReduction(0.9)), Signature((), 1))
     spans, sides = np.array([[0.0, 1.5, 0.0]]), np.array([[0, side]])
     followed = problem.follow_segments(Segments(spans, sides, np.array([start])), problem.values)
     model = problem.system.model
@@ -181,7 +181,7 @@ def test_steps_of_a_segment_are_checked_with_the_equation_of_its_own_side(side, 
 def test_lowest_gap_inside_a_segment_and_its_instant():
     """The oscillator's free response from an impact dips towards the wall: against the closed form on a fine grid."""
     system = walled(A=0.0, W=1.0, c=0.02, wall=-0.05, e=0.8)
-    problem = Problem(system, Signature((1,), 2), ("load.frequency", "load.force.amplitude", "model.wall"))
+    problem = OneContactEquations(system, Signature((1,), 2), ("load.frequency", "load.force.amplitude", "model.wall"))
     speed = 0.5
     extremes = problem.evaluate(np.array([0.3, speed]), problem.values, with_extremes=True).extremes[0]
     # x'' + c x' + x = 0 from (wall, -e v)

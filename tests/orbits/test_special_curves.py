@@ -9,11 +9,12 @@ import pytest
 from shared_systems import walled
 
 import saltus
-from saltus.orbits import SpecialCurve, SpecialPoint, conditions
-from saltus.orbits.codimension import normal_form
-from saltus.orbits.orbit_curve import OrbitCurve
-from saltus.orbits.problem import Problem
-from saltus.orbits.special_curve import SpecialCurvePoint
+from saltus.orbits import SpecialCurve, SpecialPoint
+from saltus.orbits.branches import conditions
+from saltus.orbits.branches.codimension import normal_form
+from saltus.orbits.branches.orbit_curve import OrbitCurve
+from saltus.orbits.branches.special_curve import SpecialCurvePoint
+from saltus.orbits.equations.one_contact import OneContactEquations
 from saltus.orbits.symmetry import over_full_period
 from saltus.theory.impact_oscillator import wall_orbits
 
@@ -176,9 +177,9 @@ def test_folds_and_symmetry_breakings_of_six_crossings_end_at_one_point_of_the_g
 def shift_of_the_broken_family(point: SpecialCurvePoint, distance: float) -> float:
     """How far in the first parameter the unsymmetric orbit lies that differs by a distance from a symmetric one at its BPC."""
     direction = point.condition_value.right / np.linalg.norm(point.condition_value.right)
-    problem, unknowns = over_full_period(point.orbit.problem, point.solution.unknowns)
+    problem, unknowns = over_full_period(point.orbit.equations, point.solution.unknowns)
     direction = np.concatenate([direction, -direction])
-    curve = OrbitCurve(Problem(point.orbit.system, problem.signature, (FREQUENCY,)), (1.0,))
+    curve = OrbitCurve(OneContactEquations(point.orbit.system, problem.signature, (FREQUENCY,)), (1.0,))
     guess = np.append(unknowns + distance * direction, point.solution.values[0])
     broken = curve.solve(guess, np.append(direction, 0.0))
     assert broken is not None
@@ -239,7 +240,9 @@ def test_a_curve_keeps_all_in_its_dataset() -> None:
     system = saltus.System.from_json(data.attrs["system"])
     signature = locus.orbits[0].signature
     np.testing.assert_array_equal(data.sides, [signature.sides] * len(locus.points))
-    again = Problem(system, signature, (FREQUENCY, AMPLITUDE)).evaluate(data.unknowns.values[3], data.parameter.values[3])
+    again = OneContactEquations(system, signature, (FREQUENCY, AMPLITUDE)).evaluate(
+        data.unknowns.values[3], data.parameter.values[3]
+    )
     assert again is not None
     assert np.abs(again.residual).max() < 1e-12
 

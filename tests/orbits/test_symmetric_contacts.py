@@ -231,10 +231,10 @@ def test_friction_on_ground_that_stands_still_keeps_the_symmetry() -> None:
     orbit = saltus.find_orbit(system, x=0.2, velocity=0.1)
     assert orbit.symmetric
     assert not saltus.orbits.is_symmetric(system.with_({"model.belt_speed": 0.1}))
-    problem, values, step = orbit.problem, orbit.solution.values, 1e-6
+    problem, values, step = orbit.equations, orbit.solution.values, 1e-6
     along = saltus.continue_orbit(orbit, "load.frequency", (0.29, 0.31)).orbits[0]
     unknowns, values = along.solution.unknowns, along.solution.values
-    ahead, behind = (along.problem.evaluate(unknowns, values + s * step).residual for s in (1, -1))
-    assert np.abs((ahead - behind) / (2 * step) - along.solution.equations.parameters[:, 0]).max() < 1e-6
+    ahead, behind = (along.equations.evaluate(unknowns, values + s * step).residual for s in (1, -1))
+    assert np.abs((ahead - behind) / (2 * step) - along.solution.evaluation.parameters[:, 0]).max() < 1e-6
     assert problem.signature.span == 0.5
     assert orbit.defect < 1e-11

@@ -10,7 +10,7 @@ from study_cases import FREQUENCY
 from saltus.branch_tables import branches_of
 from saltus.flow import find_recurrence
 from saltus.orbits import continue_orbit, orbits_of, search_orbits
-from saltus.orbits.newton import solve
+from saltus.orbits.equations.newton import solve
 from saltus.studies import response_spectrum
 from saltus.studies.diagram.diagram_search import MissedShare
 from saltus.studies.diagram.simulated import starts_at
@@ -71,8 +71,8 @@ def lies_on_a_stable_branch(tree, row):
             if a.signature != b.signature or start == end or not min(start, end) <= value <= max(start, end):
                 continue
             guess = a.solution.unknowns + (value - start) / (end - start) * (b.solution.unknowns - a.solution.unknowns)
-            solution = solve(a.problem, guess, np.array([value]))
-            orbit = None if solution is None else type(a)(a.problem, solution)
+            solution = solve(a.equations, guess, np.array([value]))
+            orbit = None if solution is None else type(a)(a.equations, solution)
             if orbit is not None and orbit.stable:
                 apart = max(abs(orbit.highest - highest), abs(orbit.lowest - lowest))
                 mirrored = max(abs(orbit.highest + lowest), abs(orbit.lowest + highest))

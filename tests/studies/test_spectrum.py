@@ -10,7 +10,7 @@ from study_cases import AMPLITUDE, FREQUENCY
 
 import saltus
 from saltus.orbits import orbits_of
-from saltus.orbits.newton import solve
+from saltus.orbits.equations.newton import solve
 from saltus.studies import bifurcation_diagram, response_spectrum
 
 TOUCHING = 1e-9  # speed or gap below which an orbit grazes: rounding then decides whether there is an impact
@@ -41,9 +41,9 @@ def orbits_at(branch, value):
             continue
         share = (value - start) / (end - start)
         guess = a.solution.unknowns + share * (b.solution.unknowns - a.solution.unknowns)
-        solution = solve(a.problem, guess, np.array([value]))
+        solution = solve(a.equations, guess, np.array([value]))
         assert solution is not None
-        found.append(type(a)(a.problem, solution))
+        found.append(type(a)(a.equations, solution))
     return found
 
 

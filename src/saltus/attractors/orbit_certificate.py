@@ -11,7 +11,7 @@ import numpy as np
 from saltus.attractors.stroboscopic_section import section_states
 from saltus.errors import MotionError
 from saltus.flow import EventKind, Stop, nearest_return, simulate
-from saltus.orbits import PeriodicOrbit, Signature, orbit_from, problem_of, start_at
+from saltus.orbits import PeriodicOrbit, Signature, equations_of, orbit_from, start_at
 from saltus.systems import System
 
 
@@ -97,7 +97,7 @@ def certify(system: System, state: np.ndarray, period: int | None, max_period: i
 def solved_orbit(system: System, state: np.ndarray, period: int, admissible: bool = True) -> PeriodicOrbit | None:
     """The orbit of this period near a motion from a state (d,) at phase 0; None if Newton's method finds none."""
     try:
-        orbit = orbit_from(problem_of(system, Signature((), 1)), start_at(system, state), period)
+        orbit = orbit_from(equations_of(system, Signature((), 1)), start_at(system, state), period)
     except MotionError:
         return None
     return orbit if orbit is not None and (orbit.admissible or not admissible) else None

@@ -1,22 +1,19 @@
 from .averages_over_time import mean_dissipated_power, transmissibility
-from .branch import Branch
-from .branch_continuation import STEP, continue_orbit, follow_stable
-from .contact_problem import problem_of
-from .find import find_orbit, orbit_from
-from .free_orbits import FreeOrbit, FreeOutcome, backbone, free_orbit
-from .from_dataset import orbits_of
-from .near_returns import orbits_near_returns, solved_near
-from .newton import solve
-from .orbit import PeriodicOrbit
-from .orbits_as_bytes import as_bytes, from_bytes
-from .problem import Problem
-from .resting import RestingOrbit
-from .search import Search, search_orbits
-from .signature import Signature
-from .special_curve import SpecialCurve
-from .special_curve_continuation import continue_special
-from .special_point import OrbitEnd, SpecialKind, SpecialPoint
-from .starts import (
+from .branches.branch import Branch
+from .branches.branch_continuation import STEP, continue_orbit, follow_stable
+from .branches.from_dataset import orbits_of
+from .branches.special_curve import SpecialCurve
+from .branches.special_curve_continuation import continue_special
+from .branches.special_point import OrbitEnd, SpecialKind, SpecialPoint
+from .branches.switching import Cascade, doubling_cascade, switch_branch
+from .equations.contacts import equations_of
+from .equations.newton import solve
+from .equations.one_contact import OneContactEquations
+from .equations.resting import RestingOrbit
+from .finding.from_motion import find_orbit, orbit_from
+from .finding.near_returns import orbits_near_returns, solved_near
+from .finding.search import Search, search_orbits
+from .finding.starts import (
     before_impacts,
     even_steps,
     initial_states,
@@ -27,7 +24,10 @@ from .starts import (
     states_beside,
     within_window,
 )
-from .switching import Cascade, doubling_cascade, switch_branch
+from .free_orbits import FreeOrbit, FreeOutcome, backbone, free_orbit
+from .orbit import PeriodicOrbit
+from .orbits_as_bytes import as_bytes, from_bytes
+from .signature import Signature
 from .symmetry import is_symmetric, keeps_symmetry
 from .verify import closing_distances, closing_rows, defects, same_orbit
 
@@ -37,9 +37,9 @@ __all__ = [
     "Cascade",
     "FreeOrbit",
     "FreeOutcome",
+    "OneContactEquations",
     "OrbitEnd",
     "PeriodicOrbit",
-    "Problem",
     "RestingOrbit",
     "Search",
     "Signature",
@@ -55,6 +55,7 @@ __all__ = [
     "continue_special",
     "defects",
     "doubling_cascade",
+    "equations_of",
     "even_steps",
     "find_orbit",
     "follow_stable",
@@ -68,7 +69,6 @@ __all__ = [
     "orbit_from",
     "orbits_near_returns",
     "orbits_of",
-    "problem_of",
     "rest_state",
     "same_orbit",
     "search_orbits",

@@ -12,9 +12,9 @@ import numpy as np
 from saltus.checks import check_count
 from saltus.errors import ParameterError, near
 from saltus.flow import Motion
+from saltus.orbits.equations.resting import RestingOrbit
 from saltus.orbits.free_orbits import FreeOrbit
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.resting import RestingOrbit
 from saltus.public_functions import answered
 from saltus.systems import Model, System
 

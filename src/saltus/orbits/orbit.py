@@ -13,12 +13,12 @@ from saltus.checks import LIMITS, check_count
 from saltus.errors import MotionError
 from saltus.flow import Motion, SegmentColumn, Validity, simulate
 from saltus.notebook import html_table
-from saltus.orbits.contact_problem import ContactProblem
-from saltus.orbits.followed_problem import FollowedProblem
-from saltus.orbits.newton import NEWTON_ITERATIONS, Solution, solve
-from saltus.orbits.problem import Problem
+from saltus.orbits.equations.contacts import ContactsEquations
+from saltus.orbits.equations.newton import NEWTON_ITERATIONS, Solution, solve
+from saltus.orbits.equations.one_contact import OneContactEquations
+from saltus.orbits.equations.whole_motion import WholeMotionEquations
+from saltus.orbits.finding.starts import start_at
 from saltus.orbits.signature import Signature
-from saltus.orbits.starts import start_at
 from saltus.orbits.tolerances import TOLERANCES
 from saltus.public_functions import answering
 from saltus.result import Result
@@ -37,7 +37,7 @@ class PeriodicOrbit(Result):
 
     Attributes
     ----------
-    problem
+    equations
         The equations that it solves: those of a system, with given parameters and a given sequence of impacts.
     solution
         The solution of these equations.
@@ -50,18 +50,18 @@ class PeriodicOrbit(Result):
     True
     """
 
-    problem: Problem
+    equations: OneContactEquations
     solution: Solution
 
     @classmethod
     def near(
-        cls, problem: Problem, unknowns: np.ndarray, values: np.ndarray, iterations: int = NEWTON_ITERATIONS
+        cls, equations: OneContactEquations, unknowns: np.ndarray, values: np.ndarray, iterations: int = NEWTON_ITERATIONS
     ) -> PeriodicOrbit | None:
         """The orbit near a guess at fixed parameters, or None where Newton's method does not converge.
 
         Parameters
         ----------
-        problem
+        equations
             The equations.
         unknowns
             A guess of their unknowns, (n,).
@@ -70,34 +70,34 @@ class PeriodicOrbit(Result):
         iterations
             How many steps of Newton's method at most.
         """
-        found = solve(problem, unknowns, values, iterations)
-        return None if found is None else PeriodicOrbit(problem, found)
+        found = solve(equations, unknowns, values, iterations)
+        return None if found is None else PeriodicOrbit(equations, found)
 
     @classmethod
-    def known(cls, problem: Problem, unknowns: np.ndarray, values: np.ndarray) -> PeriodicOrbit | None:
+    def known(cls, equations: OneContactEquations, unknowns: np.ndarray, values: np.ndarray) -> PeriodicOrbit | None:
         """The orbit whose unknowns are known: nothing is solved. None where its motion cannot be followed.
 
         Parameters
         ----------
-        problem
+        equations
             The equations.
         unknowns
             Their unknowns, (n,).
         values
             The parameters' values.
         """
-        equations = problem.evaluate(unknowns, values, with_extremes=True)
-        return None if equations is None else PeriodicOrbit(problem, Solution(unknowns, values, equations, 0))
+        evaluation = equations.evaluate(unknowns, values, with_extremes=True)
+        return None if evaluation is None else PeriodicOrbit(equations, Solution(unknowns, values, evaluation, 0))
 
     @cached_property
     def system(self) -> System:
         """The system, with the orbit's parameters."""
-        return self.problem.at(self.solution.values)
+        return self.equations.at(self.solution.values)
 
     @property
     def signature(self) -> Signature:
         """Sides before the impacts, forcing periods, symmetry."""
-        return self.problem.signature
+        return self.equations.signature
 
     @property
     def period(self) -> int:
@@ -112,7 +112,7 @@ class PeriodicOrbit(Result):
     @property
     def frequency(self) -> float:
         """Omega of the load."""
-        return self.problem.frequency(self.solution.values)
+        return self.equations.frequency(self.solution.values)
 
     @property
     def duration(self) -> float:
@@ -121,8 +121,8 @@ class PeriodicOrbit(Result):
 
     @cached_property
     def _phases(self) -> np.ndarray:
-        phases, _ = self.problem.impacts(self.solution.unknowns, self.solution.equations)
-        return np.concatenate([phases, phases + self.problem.closing]) if self.symmetric else phases
+        phases, _ = self.equations.impacts(self.solution.unknowns, self.solution.evaluation)
+        return np.concatenate([phases, phases + self.equations.closing]) if self.symmetric else phases
 
     @cached_property
     def impact_times(self) -> np.ndarray:
@@ -137,7 +137,7 @@ class PeriodicOrbit(Result):
     @property
     def speeds(self) -> np.ndarray:
         """The speeds at which the gap closes, just before the impacts, (n,)."""
-        _, speeds = self.problem.impacts(self.solution.unknowns, self.solution.equations)
+        _, speeds = self.equations.impacts(self.solution.unknowns, self.solution.evaluation)
         return np.tile(speeds, 2) if self.symmetric else speeds
 
     @property
@@ -153,7 +153,7 @@ class PeriodicOrbit(Result):
 
     @cached_property
     def _extremes(self) -> np.ndarray:
-        return self.solution.equations.extremes
+        return self.solution.evaluation.extremes
 
     @cached_property
     def highest(self) -> float:
@@ -195,7 +195,7 @@ class PeriodicOrbit(Result):
     def pressing(self) -> float:
         """With several contacts the least of the reactions of closed ones and the times between events; inf with one contact. If
         it is negative this is no real motion."""
-        return self.problem.pressing(self.solution.unknowns, self.solution.equations)
+        return self.equations.pressing(self.solution.unknowns, self.solution.evaluation)
 
     @property
     def admissible(self) -> bool:
@@ -208,12 +208,12 @@ class PeriodicOrbit(Result):
     def margins(self) -> dict[str, float]:
         """The least value of each of the model's margins; a negative one is passed, see `MarginKind` (errata 20, 21)."""
         least = self._extremes[:, SegmentColumn.LEAST_MARGIN :].min(axis=0)
-        return dict(zip(self.problem.margins, map(float, least), strict=False))
+        return dict(zip(self.equations.margins, map(float, least), strict=False))
 
     @cached_property
     def multipliers(self) -> np.ndarray:
         """The Floquet multipliers, by falling modulus, complex (2 degrees of freedom,)."""
-        chain = self.solution.equations.monodromy()
+        chain = self.solution.evaluation.monodromy()
         if not np.isfinite(chain).all():
             return np.full(len(chain), complex(np.inf))
         values = np.linalg.eigvals(chain).astype(complex)
@@ -226,8 +226,8 @@ class PeriodicOrbit(Result):
 
         False where the contact is no singularity (`ContactRegularity.CONTINUOUS`): multipliers then keep their meaning.
         """
-        speed = self.problem.touching_speed(self.solution.unknowns, self.solution.equations)
-        return not self.problem.passes_contact and min(abs(self.clearance), abs(speed)) < TOLERANCES.touch
+        speed = self.equations.touching_speed(self.solution.unknowns, self.solution.evaluation)
+        return not self.equations.passes_contact and min(abs(self.clearance), abs(speed)) < TOLERANCES.touch
 
     @property
     def stable(self) -> bool:
@@ -240,8 +240,8 @@ class PeriodicOrbit(Result):
 
         With several contacts, or where the orbit is followed through its events, it starts between two events.
         """
-        if isinstance(self.problem, (ContactProblem, FollowedProblem)):
-            state, time = self.problem.within(self.solution.unknowns, self.solution.equations, self.solution.values)
+        if isinstance(self.equations, (ContactsEquations, WholeMotionEquations)):
+            state, time = self.equations.within(self.solution.unknowns, self.solution.evaluation, self.solution.values)
             return {**start_at(self.system, state), "time": time}
         if not self.signature.sides:
             return start_at(self.system, self.solution.unknowns)
@@ -301,7 +301,7 @@ class PeriodicOrbit(Result):
         """Coordinate and velocity at phase 0 of the load, the stroboscopic section."""
         signature = self.signature
         if not (signature.sides or signature.events or signature.closed or signature.section):
-            n = self.problem.own
+            n = self.equations.own
             return (float(self.solution.unknowns[0]), float(self.solution.unknowns[1])) if n == 1 else (
                 self.solution.unknowns[:n], self.solution.unknowns[n:])  # fmt: skip
         start = self.start()
@@ -316,12 +316,12 @@ class PeriodicOrbit(Result):
         return np.append(*self.state)
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("_") or name in ("problem", "solution"):
+        if name.startswith("_") or name in ("equations", "solution"):
             raise AttributeError(name)
-        if name == "velocity" or name in self.problem.system.model.coordinates:
+        if name == "velocity" or name in self.equations.system.model.coordinates:
             position, velocity = self.state
             values = np.atleast_1d(position)
-            return velocity if name == "velocity" else float(values[self.problem.system.model.coordinates.index(name)])
+            return velocity if name == "velocity" else float(values[self.equations.system.model.coordinates.index(name)])
         raise AttributeError(f"a PeriodicOrbit has no {name!r}")
 
     @cached_property

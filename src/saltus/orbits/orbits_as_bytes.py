@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import ParameterError
-from saltus.orbits.newton import Solution
+from saltus.orbits.branches.orbit_curve import OrbitCurve, OrbitPoint
+from saltus.orbits.equations.newton import Solution
+from saltus.orbits.equations.one_contact import OneContactEquations
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.orbit_curve import OrbitCurve, OrbitPoint
-from saltus.orbits.problem import Problem
 from saltus.systems import System
 
 ARRAYS = ("_frombuffer", "_reconstruct", "ndarray", "dtype", "scalar")  # the names of NumPy's own functions that make arrays
@@ -52,12 +52,12 @@ class _OrbitWriter(pickle.Pickler):
         """The function and the arguments that make an object again; properties that it has computed and cached are not kept."""
         if isinstance(found, System):
             return _system, (found.to_json(),)
-        if isinstance(found, Problem):
+        if isinstance(found, OneContactEquations):
             return type(found), (found.system, found.signature, found.paths, found.tol)
         if type(found) is OrbitPoint:
             return _point, (found.curve, found.place, found.tangent, found.iterations)
         if type(found) is PeriodicOrbit:
-            return _orbit, (found.problem, found.solution.unknowns, found.solution.values, found.solution.iterations)
+            return _orbit, (found.equations, found.solution.unknowns, found.solution.values, found.solution.iterations)
         if isinstance(found, Enum):
             return type(found), (found.value,)
         if is_dataclass(found) and not isinstance(found, type):
@@ -73,7 +73,7 @@ class _OrbitReader(pickle.Unpickler):
         if module.split(".")[0] == "numpy" and name in ARRAYS:
             return super().find_class(module, name)
         found = super().find_class(module, name) if module.startswith("saltus.") else None
-        if isinstance(found, type) and (is_dataclass(found) or issubclass(found, (Enum, Problem))):
+        if isinstance(found, type) and (is_dataclass(found) or issubclass(found, (Enum, OneContactEquations))):
             return found
         raise pickle.UnpicklingError(f"{module}.{name}")
 
@@ -83,17 +83,17 @@ def _system(text: str) -> System:
 
 
 def _point(curve: OrbitCurve, place: np.ndarray, tangent: np.ndarray, iterations: int) -> OrbitPoint:
-    equations = curve.evaluate(place, thorough=True)
-    if equations is None:
+    evaluation = curve.evaluate(place, thorough=True)
+    if evaluation is None:
         raise ParameterError(DAMAGED)
-    return OrbitPoint(curve, place, tangent, iterations, equations)
+    return OrbitPoint(curve, place, tangent, iterations, evaluation)
 
 
-def _orbit(problem: Problem, unknowns: np.ndarray, values: np.ndarray, iterations: int) -> PeriodicOrbit:
-    equations = problem.evaluate(unknowns, values, with_extremes=True)
-    if equations is None:
+def _orbit(equations: OneContactEquations, unknowns: np.ndarray, values: np.ndarray, iterations: int) -> PeriodicOrbit:
+    evaluation = equations.evaluate(unknowns, values, with_extremes=True)
+    if evaluation is None:
         raise ParameterError(DAMAGED)
-    return PeriodicOrbit(problem, Solution(unknowns, values, equations, iterations))
+    return PeriodicOrbit(equations, Solution(unknowns, values, evaluation, iterations))
 
 
 MAKERS = {function.__name__: function for function in (_system, _point, _orbit)}

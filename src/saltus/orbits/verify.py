@@ -8,7 +8,7 @@ import numpy as np
 
 from saltus.checks import check_count
 from saltus.flow import simulate_many
-from saltus.orbits.followed_problem import DYING
+from saltus.orbits.equations.whole_motion import DYING
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.tolerances import TOLERANCES
 from saltus.public_functions import answered
@@ -65,8 +65,8 @@ def defects(orbits: list[PeriodicOrbit], rounds: int = 1, tol: float = 1e-13) ->
     check_count("rounds", rounds, 1)
     if len(orbits) == 0:
         return np.zeros(0)
-    problem = orbits[0].problem
-    return closing_distances(problem.system, next(iter(problem.paths), None), closing_rows(orbits, rounds), tol)
+    equations = orbits[0].equations
+    return closing_distances(equations.system, next(iter(equations.paths), None), closing_rows(orbits, rounds), tol)
 
 
 def closing_rows(orbits: list[PeriodicOrbit], rounds: int = 1) -> np.ndarray:

@@ -33,8 +33,8 @@ SETTINGS = KnotSettings()
 def orbit_at(branch: Any, index: int, value: float) -> Any:
     """The orbit of a branch near its point `index`, solved at a value of the parameter; None where Newton does not converge."""
     (near,) = orbits_of(branch.isel(point=[index]))
-    found = solve(near.problem, near.solution.unknowns, np.array([value]))
-    return None if found is None else PeriodicOrbit(near.problem, found)
+    found = solve(near.equations, near.solution.unknowns, np.array([value]))
+    return None if found is None else PeriodicOrbit(near.equations, found)
 
 
 def knots(spectrum: Any) -> Any:

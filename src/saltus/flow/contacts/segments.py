@@ -1,7 +1,7 @@
 """Smooth segments of motions with several contacts, from event to event, with their derivatives: the parts of periodic orbits.
 
 The events, their times and the contacts that are closed between them are given. The motion is followed whatever the signs of the
-gaps and the reactions; the orbit's equations make each event's guard 0 (see `orbits/contact_problem.py`). A family of orbits
+gaps and the reactions; the orbit's equations make each event's guard 0 (see `orbits/equations/contacts.py`). A family of orbits
 therefore goes smoothly through the point at which one of its events disappears.
 
 Its compiled part goes into one module with those of the files that it imports from.

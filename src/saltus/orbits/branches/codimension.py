@@ -8,11 +8,11 @@ import numpy as np
 
 from saltus.continuation import End, TestFunction
 from saltus.flow import SegmentColumn
-from saltus.orbits.bifurcations import scaled_determinant
-from saltus.orbits.conditions import Singular, cubic, quadratic
-from saltus.orbits.grazing import removed
-from saltus.orbits.special_curve import SpecialCurvePoint
-from saltus.orbits.special_point import SpecialKind
+from saltus.orbits.branches.beyond_grazing import removed
+from saltus.orbits.branches.bifurcations import scaled_determinant
+from saltus.orbits.branches.conditions import Singular, cubic, quadratic
+from saltus.orbits.branches.special_curve import SpecialCurvePoint
+from saltus.orbits.branches.special_point import SpecialKind
 from saltus.orbits.tolerances import TOLERANCES
 
 BRACKET_WIDTH = 1e-15  # width of the bracket, in the step that contains the point
@@ -38,7 +38,7 @@ def curve_tests(kind: str, symmetric: bool) -> list[TestFunction]:
     return [
         curve_test(SpecialKind.LP_GR, lambda point: without(point, 1.0)),
         curve_test(SpecialKind[f"{flip}_GR"], lambda point: without(point, -1.0)),
-        curve_test(SpecialKind[f"LP_{flip}_GR"], lambda point: scaled_determinant(point.equations.jacobian(1.0))),
+        curve_test(SpecialKind[f"LP_{flip}_GR"], lambda point: scaled_determinant(point.evaluation.jacobian(1.0))),
     ]
 
 
@@ -57,11 +57,11 @@ def room(point: SpecialCurvePoint) -> float:
     orbit, touching = point.orbit, point.touching
     n = len(orbit.signature.sides)
     speeds = np.delete(point.solution.unknowns[1::2], touching) if n else np.empty(0)
-    extremes = point.equations.extremes
+    extremes = point.evaluation.extremes
     humps, phases = extremes[:, SegmentColumn.LOWEST_GAP], extremes[:, SegmentColumn.LOWEST_GAP_TIME] * orbit.frequency
     if touching:
         touch = point.solution.unknowns[2 * touching[0]]
-        away = np.abs(np.array([phases - touch + turn * orbit.problem.closing for turn in (-1, 0, 1)])).min(axis=0)
+        away = np.abs(np.array([phases - touch + turn * orbit.equations.closing for turn in (-1, 0, 1)])).min(axis=0)
         humps = humps[~(away < TOLERANCES.pair)]
     return min(CAP, float(speeds.min(initial=np.inf)), float(humps.min(initial=np.inf)))
 
@@ -72,5 +72,5 @@ def without(point: SpecialCurvePoint, closing: float) -> float:
     That orbit lacks the impacts that have no speed. Perturbations return as they were (closing +1) or with the other sign (-1).
     """
     other = removed(point)
-    equations = None if isinstance(other, End) else other[0].evaluate(other[1], point.solution.values)
-    return 1.0 if equations is None else scaled_determinant(equations.jacobian(closing))
+    evaluation = None if isinstance(other, End) else other[0].evaluate(other[1], point.solution.values)
+    return 1.0 if evaluation is None else scaled_determinant(evaluation.jacobian(closing))

@@ -17,8 +17,8 @@ from functools import cached_property
 import numpy as np
 
 from saltus.flow import ContactColumn, EventCode, SegmentColumn, SegmentEnd, SegmentExtremes, SegmentPlan, load_contact_segments
-from saltus.orbits.followed_problem import FollowedProblem
-from saltus.orbits.problem import ORBIT_TOLERANCE, Equations, Problem
+from saltus.orbits.equations.one_contact import ORBIT_TOLERANCE, OneContactEquations, OrbitEvaluation
+from saltus.orbits.equations.whole_motion import WholeMotionEquations
 from saltus.orbits.signature import ModeChange, Signature
 from saltus.orbits.tolerances import TOLERANCES
 from saltus.systems import System, image_of
@@ -29,7 +29,7 @@ START_SHARE = 0.4  # where in a segment a motion is started; not in its middle, 
 
 
 @dataclass(frozen=True)
-class ContactEquations(Equations):
+class ContactsEvaluation(OrbitEvaluation):
     """The problem at one point; its derivatives are `here`, to the unknowns, and `there`, to the unknowns a period later."""
 
     seen: np.ndarray  # (n, ...): the extremes along each segment, in the columns of `SegmentExtremes`; empty if not asked for
@@ -55,7 +55,7 @@ class ContactEquations(Equations):
                 return np.full((len(state), len(state)), np.inf)
 
 
-class ContactProblem(Problem):
+class ContactsEquations(OneContactEquations):
     """The equations of one signature of a system with several contacts."""
 
     @cached_property
@@ -107,26 +107,26 @@ class ContactProblem(Problem):
     def alternating(self, direction: np.ndarray) -> np.ndarray:
         return np.append(direction, -direction[len(self._free) :])
 
-    def impacts(self, unknowns: np.ndarray, equations: Equations) -> tuple[np.ndarray, np.ndarray]:
+    def impacts(self, unknowns: np.ndarray, evaluation: OrbitEvaluation) -> tuple[np.ndarray, np.ndarray]:
         chosen = np.array([event.is_impact for event in self.signature.events], dtype=bool)
-        speeds = -np.roll(equations.ends[:, SegmentEnd.RATE], 1)[: len(chosen)]
+        speeds = -np.roll(evaluation.ends[:, SegmentEnd.RATE], 1)[: len(chosen)]
         return self.split(unknowns)[1][chosen], speeds[chosen]
 
-    def touching_speed(self, unknowns: np.ndarray, equations: Equations) -> float:
+    def touching_speed(self, unknowns: np.ndarray, evaluation: OrbitEvaluation) -> float:
         rows = (self.plan[:, SegmentPlan.KIND] == EventCode.IMPACT) & (self.plan[:, SegmentPlan.POWER] == 0)
-        return float((-equations.ends[rows, SegmentEnd.RATE]).min(initial=math.inf))
+        return float((-evaluation.ends[rows, SegmentEnd.RATE]).min(initial=math.inf))
 
-    def pressing(self, unknowns: np.ndarray, equations: Equations) -> float:
+    def pressing(self, unknowns: np.ndarray, evaluation: OrbitEvaluation) -> float:
         """The least of the reactions of closed contacts, the times between events, and the gaps of other contacts at impacts."""
-        assert isinstance(equations, ContactEquations)
+        assert isinstance(evaluation, ContactsEvaluation)
         phases = self.split(unknowns)[1]
         apart = np.diff(np.append(phases, phases[:1] + self.closing))
-        forces = equations.seen[:, [SegmentExtremes.FORCE, SegmentExtremes.PULL, SegmentExtremes.TAIL, SegmentExtremes.BESIDE]]
+        forces = evaluation.seen[:, [SegmentExtremes.FORCE, SegmentExtremes.PULL, SegmentExtremes.TAIL, SegmentExtremes.BESIDE]]
         return float(min(forces.min(), apart.min(initial=math.inf)))
 
     def evaluate(
         self, unknowns: np.ndarray, values: np.ndarray, with_extremes: bool = False, *, later: np.ndarray | None = None
-    ) -> ContactEquations | None:
+    ) -> ContactsEvaluation | None:
         frequency, later = self.frequency(values), unknowns if later is None else later
         if not (frequency > 0.0 and all(np.isfinite(numbers).all() for numbers in (unknowns, later, values))):
             return None
@@ -169,7 +169,7 @@ class ContactProblem(Problem):
         columns: np.ndarray,
         maps: np.ndarray,
         seen: np.ndarray,
-    ) -> ContactEquations:
+    ) -> ContactsEvaluation:
         """The residual and its derivatives, by the chain rule from segment to segment; `end` is the state asked for at the end.
 
         Columns are the state at the start, the phases, the phase of the first event a period later, and the parameters.
@@ -207,7 +207,7 @@ class ContactProblem(Problem):
         if events:
             there[:, first] = total[:, end_phase]
         residual = np.append(guards, (after - end)[free])
-        return ContactEquations(residual, here, there, total[:, parameters:], ends, self._extremes(seen), seen, first)
+        return ContactsEvaluation(residual, here, there, total[:, parameters:], ends, self._extremes(seen), seen, first)
 
     def _extremes(self, seen: np.ndarray) -> np.ndarray:
         """The extremes along the segments, in the columns that orbits with one contact use (`flow/one_contact/segments.py`)."""
@@ -220,20 +220,20 @@ class ContactProblem(Problem):
         extremes[:, SegmentColumn.LEAST_MARGIN :] = seen[:, SegmentExtremes.MARGINS :]
         return extremes
 
-    def within(self, unknowns: np.ndarray, equations: Equations, values: np.ndarray) -> tuple[np.ndarray, float]:
+    def within(self, unknowns: np.ndarray, evaluation: OrbitEvaluation, values: np.ndarray) -> tuple[np.ndarray, float]:
         """A state within the longest segment, and its time; for an orbit without events, the state at phase 0."""
         state, phases = self.split(unknowns)
         if not phases.size:
             return self._with_held(state, self.signature.closed, values), 0.0
         times = np.append(phases, phases[0] + self.closing) / self.frequency(values)
         longest = int(np.argmax(np.diff(times)))
-        begin = equations.ends[longest, SegmentEnd.NUMBERS : SegmentEnd.NUMBERS + 2 * self.own]
+        begin = evaluation.ends[longest, SegmentEnd.NUMBERS : SegmentEnd.NUMBERS + 2 * self.own]
         part = times[longest] + np.array([0.0, START_SHARE]) * (times[longest + 1] - times[longest])
         there = self.carried_along(begin, int(self.plan[longest, SegmentPlan.ALONG]), part, values)
         assert there is not None, "an orbit's own segments can be followed"
         return there, float(part[1])
 
-    def halves(self, unknowns: np.ndarray, equations: Equations) -> np.ndarray | None:
+    def halves(self, unknowns: np.ndarray, evaluation: OrbitEvaluation) -> np.ndarray | None:
         """The unknowns of both halves of a period, each as unknowns of the equations over one half, (2, n); None where the events
         of the halves differ."""
         events, half = self.signature.events, len(self.signature.events) // 2
@@ -243,7 +243,7 @@ class ContactProblem(Problem):
             return None
         state, phases = self.split(unknowns)
         place = SegmentEnd.NUMBERS + 8 * own
-        later = equations.ends[half - 1, place : place + 2 * own]
+        later = evaluation.ends[half - 1, place : place + 2 * own]
         later = image_of(self.system.model, later) if odd else later
         first, second = self.joined(state, phases[:half]), self.joined(later, phases[half:] - np.pi * self.signature.period)
         return np.stack([first, second])
@@ -267,7 +267,9 @@ def no_event(closed: int) -> np.ndarray:
     return np.array([[closed, -1, -1, closed, 0, -1]], dtype=np.int64)
 
 
-def problem_of(system: System, signature: Signature, paths: tuple[str, ...] = (), tol: float = ORBIT_TOLERANCE) -> Problem:
+def equations_of(
+    system: System, signature: Signature, paths: tuple[str, ...] = (), tol: float = ORBIT_TOLERANCE
+) -> OneContactEquations:
     """The problem of a signature: with one contact, with several, or, if the signature has a section, followed as one motion."""
-    kind: type[Problem] = ContactProblem if system.model.held else Problem
-    return (kind if signature.section is None else FollowedProblem)(system, signature, paths, tol)
+    kind: type[OneContactEquations] = ContactsEquations if system.model.held else OneContactEquations
+    return (kind if signature.section is None else WholeMotionEquations)(system, signature, paths, tol)

@@ -11,10 +11,10 @@ from saltus.checks import check_dataset
 from saltus.continuation import NEWTON
 from saltus.errors import ParameterError
 from saltus.flow import load_releases
-from saltus.orbits.contact_problem import problem_of
+from saltus.orbits.equations.contacts import equations_of
+from saltus.orbits.equations.one_contact import OneContactEquations
+from saltus.orbits.equations.resting import resting_orbit
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.problem import Problem
-from saltus.orbits.resting import resting_orbit
 from saltus.orbits.signature import ModeChange, Signature
 from saltus.provenance import check_provenance
 from saltus.public_functions import answered
@@ -57,12 +57,12 @@ def orbits_of(dataset: xarray.Dataset) -> list[PeriodicOrbit]:
         return _resting_orbits(dataset, system)
     paths = tuple(map(str, dataset["path"].values)) if "path" in dataset.coords else (str(dataset.attrs["path"]),)
     values = np.atleast_2d(dataset["parameter"].values.T).T
-    problems: dict[Signature, Problem] = {}
+    known: dict[Signature, OneContactEquations] = {}
     orbits = []
     for signature, row, value in zip(_signatures(dataset), dataset["unknowns"].values, values, strict=True):
-        if signature not in problems:
-            problems[signature] = problem_of(system, signature, paths, tol)
-        orbits.append(_orbit(problems[signature], row, value))
+        if signature not in known:
+            known[signature] = equations_of(system, signature, paths, tol)
+        orbits.append(_orbit(known[signature], row, value))
     return orbits
 
 
@@ -85,13 +85,13 @@ def _signature(sides: np.ndarray, periods: Any, symmetric: Any, side: Any) -> Si
     return Signature(tuple(int(s) for s in sides if s), int(periods), bool(symmetric), int(side))
 
 
-def _orbit(problem: Problem, row: np.ndarray, value: np.ndarray) -> PeriodicOrbit:
+def _orbit(equations: OneContactEquations, row: np.ndarray, value: np.ndarray) -> PeriodicOrbit:
     values = value.astype(float)
-    orbit = PeriodicOrbit.known(problem, row[: problem.size].copy(), values)
-    scale = max(1.0, float(np.abs(row[: problem.size]).max()))
+    orbit = PeriodicOrbit.known(equations, row[: equations.size].copy(), values)
+    scale = max(1.0, float(np.abs(row[: equations.size]).max()))
     if orbit is None or not orbit.residual <= NEWTON.stalled * scale:
         error = "its motion cannot be followed" if orbit is None else f"its residual is {orbit.residual:.1e}"
-        raise ParameterError(f"what is kept at {problem.paths[0]} = {values[0]:g} is no orbit ({error}): the data are damaged")
+        raise ParameterError(f"what is kept at {equations.paths[0]} = {values[0]:g} is no orbit ({error}): the data are damaged")
     return orbit
 
 
@@ -102,7 +102,7 @@ def _resting_orbits(dataset: xarray.Dataset, system: System) -> list[PeriodicOrb
     for first, value, periods in zip(dataset["releases"].values[:, 0], *(dataset[name].values for name in columns), strict=True):
         here = system.with_({path: float(value)})
         nearest = min(load_releases(here), key=lambda release: abs(release.time - first), default=None)
-        orbit = resting_orbit(Problem(here, Signature((), 1), (path,)), nearest, int(periods)) if nearest else None
+        orbit = resting_orbit(OneContactEquations(here, Signature((), 1), (path,)), nearest, int(periods)) if nearest else None
         if orbit is None:
             raise ParameterError(f"no orbit rests at {path} = {value:g}: the file is damaged, or of another version of saltus")
         orbits.append(orbit)

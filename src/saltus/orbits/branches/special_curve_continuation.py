@@ -11,24 +11,24 @@ import numpy as np
 from saltus.checks import check_bounds, check_count, check_path, check_step
 from saltus.continuation import STEPS, Continuation, Cut, End, TestFunction, both_ways
 from saltus.errors import ParameterError
-from saltus.orbits.bifurcations import grazing
-from saltus.orbits.branch_continuation import STEP
-from saltus.orbits.branch_events import OrbitEvents
-from saltus.orbits.codimension import curve_test, curve_tests, room
-from saltus.orbits.conditions import Condition, Singular, Slow
-from saltus.orbits.contact_problem import ContactProblem, problem_of
-from saltus.orbits.contact_signature import section_of
-from saltus.orbits.find import divide
-from saltus.orbits.followed_problem import FollowedProblem
-from saltus.orbits.grazing import inserted
+from saltus.orbits.branches.beyond_events import change_at, same_events
+from saltus.orbits.branches.beyond_grazing import inserted
+from saltus.orbits.branches.beyond_switching import contact_change
+from saltus.orbits.branches.bifurcations import grazing
+from saltus.orbits.branches.branch_continuation import STEP
+from saltus.orbits.branches.branch_events import OrbitEvents
+from saltus.orbits.branches.codimension import curve_test, curve_tests, room
+from saltus.orbits.branches.conditions import Condition, Singular, Slow
+from saltus.orbits.branches.special_curve import ConditionedCurve, SpecialCurve, SpecialCurvePoint, without_condition
+from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint
+from saltus.orbits.equations.contacts import ContactsEquations, equations_of
+from saltus.orbits.equations.one_contact import OneContactEquations
+from saltus.orbits.equations.resting import RestingOrbit
+from saltus.orbits.equations.whole_motion import WholeMotionEquations
+from saltus.orbits.finding.contact_signature import section_of
+from saltus.orbits.finding.from_motion import divide
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.problem import Problem
-from saltus.orbits.resting import RestingOrbit
 from saltus.orbits.signature import Signature
-from saltus.orbits.special_curve import ConditionedCurve, SpecialCurve, SpecialCurvePoint, without_condition
-from saltus.orbits.special_point import OrbitEnd, SpecialKind, SpecialPoint
-from saltus.orbits.switching_contacts import contact_change
-from saltus.orbits.switching_followed import change_at, same_events
 from saltus.orbits.symmetry import full_point, half, keeps_symmetry, over_full_period
 from saltus.orbits.tolerances import TOLERANCES
 from saltus.progress import Progress, silent
@@ -47,16 +47,16 @@ class CurveEvents(OrbitEvents):
     def interrupted(self, run: Continuation, point: SpecialCurvePoint, ahead: SpecialCurvePoint) -> End | None:
         """The end where the system refuses the parameters."""
         try:
-            ahead.curve.problem.at(ahead.parameters)
+            ahead.curve.equations.at(ahead.parameters)
         except ParameterError as refusal:
             return End(OrbitEnd.REFUSED, point.parameter, detail=str(refusal))
         return None
 
     def barrier(self, point: Any) -> TestFunction:
         """Another grazing, or another change of the events of an orbit with several contacts or friction."""
-        if isinstance(point.orbit.problem, FollowedProblem):
+        if isinstance(point.orbit.equations, WholeMotionEquations):
             return same_events(point)
-        several = isinstance(point.orbit.problem, ContactProblem)
+        several = isinstance(point.orbit.equations, ContactsEquations)
         return curve_test(SpecialKind[f"{self.kind}_GR"], grazing if several else room)
 
     def cut(self, point: SpecialCurvePoint, ahead: SpecialCurvePoint) -> Cut | End | None:
@@ -66,12 +66,12 @@ class CurveEvents(OrbitEvents):
         if not isinstance(found, Cut) or found.special is None or isinstance(point.condition, Slow):
             return found
         plain, change = without_condition(found.point), SpecialKind.GR
-        if isinstance(point.orbit.problem, FollowedProblem):
+        if isinstance(point.orbit.equations, WholeMotionEquations):
             there = change_at(replace(found.special, point=plain), without_condition(point))
             if isinstance(there, End) or there.special is None:
                 return there if isinstance(there, End) else Cut(found.point, None)
             change = SpecialKind[there.special.kind]
-        elif isinstance(point.orbit.problem, ContactProblem):
+        elif isinstance(point.orbit.equations, ContactsEquations):
             change = contact_change(full_point(plain) if plain.orbit.symmetric else plain)
         kind = SpecialKind[f"{self.kind}_GR" if change is SpecialKind.GR else f"{self.kind}_SW"]
         return Cut(found.point, replace(found.special, kind=kind))
@@ -152,13 +152,13 @@ def continue_special(
         raise ParameterError(
             "curves are followed of orbits between impacts only, and this one rests; continue it along one parameter", "special"
         )
-    if special.kind == SpecialKind.GR and special.orbit.problem.passes_contact:
+    if special.kind == SpecialKind.GR and special.orbit.equations.passes_contact:
         raise ParameterError(
             "this GR is no singularity, as neither the velocity nor the acceleration changes at the contact: nothing begins or "
             "ends there, and no curve of such points is followed; choose an LP, PD or BPC",
             "special",
         )
-    first_path, system = special.orbit.problem.paths[0], special.orbit.system
+    first_path, system = special.orbit.equations.paths[0], special.orbit.system
     check_system(system, "continue_special", several_contacts=True)
     if path == first_path:
         raise ParameterError(
@@ -194,7 +194,7 @@ def _start(special: SpecialPoint, paths: tuple[str, str], limits: list[tuple[flo
     """The special point as a point of its curve."""
     orbit, condition = _defined(special, paths)
     scales = tuple((high - low) / 3.0 for low, high in limits)
-    curve = ConditionedCurve(orbit.problem, scales, condition=condition)
+    curve = ConditionedCurve(orbit.equations, scales, condition=condition)
     exact = curve.along_condition(orbit)
     if exact is None:
         raise ParameterError(
@@ -206,10 +206,10 @@ def _start(special: SpecialPoint, paths: tuple[str, str], limits: list[tuple[flo
 
 def _from_another_section(point: SpecialCurvePoint) -> SpecialCurvePoint | None:
     """The same point with the section at a phase farther from all events, to be followed in the same direction as before."""
-    condition, problem = point.condition, point.orbit.problem
+    condition, equations = point.condition, point.orbit.equations
     assert isinstance(condition, Singular)
     phase, state = section_of(point.orbit.motion(), point.orbit.frequency)
-    moved = problem.with_signature(replace(problem.signature, section=phase))
+    moved = equations.with_signature(replace(equations.signature, section=phase))
     orbit = PeriodicOrbit.near(moved, state, point.parameters)
     if orbit is None:
         return None
@@ -224,7 +224,7 @@ def _from_another_section(point: SpecialCurvePoint) -> SpecialCurvePoint | None:
 
 def _defined(special: SpecialPoint, paths: tuple[str, str]) -> tuple[PeriodicOrbit, Condition]:
     """The orbit as a solution of the problem along both parameters, and the condition of its special point."""
-    kind, old, unknowns = special.kind, special.orbit.problem, special.orbit.solution.unknowns
+    kind, old, unknowns = special.kind, special.orbit.equations, special.orbit.solution.unknowns
     system, values = special.orbit.system, np.array([special.parameter, special.orbit.system.parameters[paths[1]]])
     symmetric = keeps_symmetry(system, paths[0]) and keeps_symmetry(system, paths[1])
     if old.signature.symmetric and not symmetric and kind != SpecialKind.LP:
@@ -234,17 +234,17 @@ def _defined(special: SpecialPoint, paths: tuple[str, str]) -> tuple[PeriodicOrb
         )
     if kind == SpecialKind.GR:
         signature, unknowns = _touching(special)
-        orbit = _evaluated(Problem(system, signature, paths), unknowns, values)
-        return orbit, Slow(orbit.problem, _first_without_speed(orbit.problem, unknowns))
-    problem = problem_of(system, old.signature, paths)
-    if old.passes_contact and not problem.passes_contact:
+        orbit = _evaluated(OneContactEquations(system, signature, paths), unknowns, values)
+        return orbit, Slow(orbit.equations, _first_without_speed(orbit.equations, unknowns))
+    equations = equations_of(system, old.signature, paths)
+    if old.passes_contact and not equations.passes_contact:
         raise ParameterError(
             f"{paths[1]} makes the contact a singularity, which it is not at {system.parameters[paths[1]]:g}; change it "
             f"a little, follow the branch again, and continue the {kind} from there"
         )
     if kind == SpecialKind.LP and old.signature.symmetric and not symmetric:
-        problem, unknowns = over_full_period(problem, unknowns)
-    orbit = _evaluated(problem, unknowns, values)
+        equations, unknowns = over_full_period(equations, unknowns)
+    orbit = _evaluated(equations, unknowns, values)
     if kind == SpecialKind.PD:
         orbit = divide(orbit) or orbit
     elif kind == SpecialKind.BPC and not old.signature.symmetric:
@@ -255,8 +255,8 @@ def _defined(special: SpecialPoint, paths: tuple[str, str]) -> tuple[PeriodicOrb
     return orbit, Singular.near(orbit, 1.0 if kind == SpecialKind.LP else -1.0)
 
 
-def _evaluated(problem: Problem, unknowns: np.ndarray, values: np.ndarray) -> PeriodicOrbit:
-    orbit = PeriodicOrbit.known(problem, unknowns, values)
+def _evaluated(equations: OneContactEquations, unknowns: np.ndarray, values: np.ndarray) -> PeriodicOrbit:
+    orbit = PeriodicOrbit.known(equations, unknowns, values)
     if orbit is None:
         raise ParameterError("the motion of the special point cannot be followed; locate it again on its branch")
     return orbit
@@ -267,14 +267,14 @@ def _touching(special: SpecialPoint) -> tuple[Signature, np.ndarray]:
     point = special.point
     if point.orbit.slowest < TOLERANCES.touch:  # the signature has an impact where the orbit touches, and the gap a minimum
         return point.orbit.signature, point.solution.unknowns
-    problem, unknowns = inserted(point)
-    return problem.signature, unknowns
+    equations, unknowns = inserted(point)
+    return equations.signature, unknowns
 
 
-def _first_without_speed(problem: Problem, unknowns: np.ndarray) -> int:
+def _first_without_speed(equations: OneContactEquations, unknowns: np.ndarray) -> int:
     """The number of the impact without speed; of a pair, the first one."""
     phases, speeds = unknowns[::2], unknowns[1::2]
     slow = int(np.argmin(np.abs(speeds)))
-    before = phases[slow] - phases[slow - 1] + (problem.closing if slow == 0 else 0.0)
+    before = phases[slow] - phases[slow - 1] + (equations.closing if slow == 0 else 0.0)
     is_second = len(speeds) > 1 and max(abs(before), abs(speeds[slow - 1])) < TOLERANCES.pair
     return (slow - 1) % len(speeds) if is_second else slow

@@ -11,10 +11,10 @@ import numpy as np
 from saltus.checks import check_number
 from saltus.continuation import Course, End
 from saltus.notebook import html_table
+from saltus.orbits.branches.orbit_curve import OrbitPoint
+from saltus.orbits.branches.resting_family import RestingPoint
+from saltus.orbits.branches.special_point import OrbitEnd, SpecialPoint
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.orbit_curve import OrbitPoint
-from saltus.orbits.resting_family import RestingPoint
-from saltus.orbits.special_point import OrbitEnd, SpecialPoint
 from saltus.public_functions import answering
 from saltus.result import Result
 
@@ -90,7 +90,7 @@ class Branch(Result, Course[OrbitPoint | RestingPoint, SpecialPoint]):
 
     def to_xarray(self) -> xarray.Dataset:
         """The branch as a dataset, see `branch_dataset.py`."""
-        from saltus.orbits.branch_dataset import branch_dataset
+        from saltus.orbits.branches.branch_dataset import branch_dataset
 
         return branch_dataset(self)
 

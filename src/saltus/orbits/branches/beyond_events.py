@@ -17,15 +17,15 @@ import numpy as np
 from saltus.continuation import Bounds, Corrected, Course, CurveEnd, Cut, End, Evidence, TestFunction, Zero
 from saltus.errors import SaltusError
 from saltus.flow import EventCode
-from saltus.orbits.bifurcations import FLIP
-from saltus.orbits.contact_signature import section_of
-from saltus.orbits.followed_events import SETTINGS as EVENTS
-from saltus.orbits.followed_events import FollowedEvents, OrbitEvent
-from saltus.orbits.followed_problem import FollowedEquations, FollowedProblem
-from saltus.orbits.images import is_image, nearest, parent_of
+from saltus.orbits.branches.bifurcations import FLIP
+from saltus.orbits.branches.images import is_image, nearest, parent_of
+from saltus.orbits.branches.orbit_curve import OrbitPoint
+from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint
+from saltus.orbits.equations.event_sequence import SETTINGS as EVENTS
+from saltus.orbits.equations.event_sequence import FollowedEvents, OrbitEvent
+from saltus.orbits.equations.whole_motion import WholeMotionEquations, WholeMotionEvaluation
+from saltus.orbits.finding.contact_signature import section_of
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.orbit_curve import OrbitPoint
-from saltus.orbits.special_point import OrbitEnd, SpecialKind, SpecialPoint
 
 EventSequence = tuple[OrbitEvent, ...]
 TINY = float(np.finfo(float).tiny)  # replaces a distance of 0 before a change of events, to keep the test function negative there
@@ -73,10 +73,10 @@ SETTINGS = OtherSideSettings()
 
 def events_at(point: OrbitPoint) -> FollowedEvents:
     """The events of a point's orbit."""
-    equations = point.equations
-    assert isinstance(equations, FollowedEquations)
-    assert equations.followed is not None
-    return equations.followed
+    evaluation = point.evaluation
+    assert isinstance(evaluation, WholeMotionEvaluation)
+    assert evaluation.followed is not None
+    return evaluation.followed
 
 
 def same_events(reference: OrbitPoint) -> TestFunction:
@@ -108,9 +108,9 @@ def change_at(zero: Zero, reference: OrbitPoint) -> Cut | End:
     if other is None:
         kind: SpecialKind | None = SpecialKind.SW
     elif _is_discontinuous(other):
-        kind = first_change(events_at(here), events_of_equations(other))
+        kind = first_change(events_at(here), events_of_evaluation(other))
     else:
-        kind = kind_between(before, events_of_equations(other))
+        kind = kind_between(before, events_of_evaluation(other))
     return Cut(zero.point, None if kind is None else SpecialPoint(kind, zero.point, zero.evidence))
 
 
@@ -119,7 +119,7 @@ def refused_beyond(point: OrbitPoint, step: float, bounds: Bounds) -> End | None
     system accepts the parameters ahead, so that something else stops the steps."""
     ahead = point.parameters + SETTINGS.refused * step * point.tangent[-len(point.parameters) :]
     try:
-        point.curve.problem.at(ahead)
+        point.curve.equations.at(ahead)
     except SaltusError as refusal:
         near = [(name, bound) for name, pair in bounds.items() for bound in pair if np.isclose(bound, point.parameter, rtol=1e-9)]
         return End(CurveEnd.BOUND, near[0][1]) if near else End(OrbitEnd.REFUSED, point.parameter, detail=str(refusal))
@@ -137,7 +137,7 @@ def stalled_at(point: OrbitPoint, step: float, points: Sequence[OrbitPoint] = ()
     if beside is None:
         return None
     test, width = same_events(point), step * np.abs(np.array(point.curve.scales))
-    there, value = -max(events_of_equations(beside).distance, TINY), test.value(point)
+    there, value = -max(events_of_evaluation(beside).distance, TINY), test.value(point)
     known = [(value, point.parameters)]
     for before in reversed(points):
         if before.curve.joins(point.curve) and test.value(before) > SETTINGS.fall * max(known[-1][0], TINY):
@@ -153,7 +153,7 @@ def stalled_at(point: OrbitPoint, step: float, points: Sequence[OrbitPoint] = ()
 def _stands(point: OrbitPoint) -> bool:
     """Whether a system with friction does not move, up to rounding: it sticks, and may do so at any position nearby."""
     orbit = point.orbit
-    return bool(orbit.problem.system.model.frictions) and orbit.highest - orbit.lowest < SETTINGS.standing
+    return bool(orbit.equations.system.model.frictions) and orbit.highest - orbit.lowest < SETTINGS.standing
 
 
 def beyond(cut: Cut, points: Sequence[OrbitPoint]) -> OrbitPoint | End:
@@ -178,7 +178,7 @@ def other_events(point: OrbitPoint, sequence: EventSequence | None, points: Sequ
     back.
     """
     reason, detail, sides = OrbitEnd.NO_OTHER_EVENTS, "", list[tuple[np.ndarray, np.ndarray]]()
-    curve = point.curve.with_problem(point.curve.problem)
+    curve = point.curve.with_equations(point.curve.equations)
 
     def solved(place: np.ndarray, direction: np.ndarray, probe: float) -> OrbitPoint | None:
         ahead: OrbitPoint | None = curve.solve_within(place, direction, SETTINGS.near * probe)
@@ -186,11 +186,11 @@ def other_events(point: OrbitPoint, sequence: EventSequence | None, points: Sequ
             return None
         return None if is_image(ahead) or _lies_on(points, ahead, SETTINGS.same * probe) else ahead
 
-    for beside, equations in _beside(point, sequence):
-        if _is_discontinuous(equations):
-            reason, detail = OrbitEnd.NOT_CONTINUOUS, f"{np.abs(equations.residual).max():.3g}"
+    for beside, evaluation in _beside(point, sequence):
+        if _is_discontinuous(evaluation):
+            reason, detail = OrbitEnd.NOT_CONTINUOUS, f"{np.abs(evaluation.residual).max():.3g}"
             continue
-        tangent = curve.along_kernel(Corrected(point.place, equations, 0)).tangent
+        tangent = curve.along_kernel(Corrected(point.place, evaluation, 0)).tangent
         sides.append((beside, tangent))
         for probe, direction in product(SETTINGS.probes, (tangent, -tangent)):
             if (ahead := solved(point.place + probe * direction, direction, probe)) is not None:
@@ -215,10 +215,10 @@ def _just_beyond(point: OrbitPoint, place: np.ndarray, way: np.ndarray, probe: f
         at = -SETTINGS.approach[len(known)] * probe if len(known) < 2 else _zero_of_line(*known[-2:])
         if len(known) > 1 and not abs(at - known[-1][0]) > SETTINGS.inside * probe**2:
             return np.asarray(place + (at + SETTINGS.inside * probe**2) * axis)
-        equations = point.curve.evaluate(place + at * axis, thorough=True)
-        if equations is None or events_of_equations(equations).sequence != events_at(point).sequence:
+        evaluation = point.curve.evaluate(place + at * axis, thorough=True)
+        if evaluation is None or events_of_evaluation(evaluation).sequence != events_at(point).sequence:
             return np.asarray(place + (at + SETTINGS.inside * probe**2) * axis) if len(known) > 1 else None
-        known.append((at, events_of_equations(equations).distance))
+        known.append((at, events_of_evaluation(evaluation).distance))
     return None
 
 
@@ -239,10 +239,10 @@ def jump_over(cut: Cut, following: OrbitPoint) -> SpecialPoint | None:
         return None
     test, way = FLIP[cut.point.orbit.symmetric], following.place - cut.point.place
     place = cut.point.place + SETTINGS.beside[-1] / following.curve.norm(way) * way
-    equations = following.curve.evaluate(place, thorough=True)
-    if equations is None or events_of_equations(equations).sequence != events_at(following).sequence:
+    evaluation = following.curve.evaluate(place, thorough=True)
+    if evaluation is None or events_of_evaluation(evaluation).sequence != events_at(following).sequence:
         return None
-    before, after = (test.value(point) for point in (cut.point, replace(following, place=place, equations=equations)))
+    before, after = (test.value(point) for point in (cut.point, replace(following, place=place, evaluation=evaluation)))
     evidence = replace(cut.special.evidence, before=before, after=after, value=before)
     return SpecialPoint(test.kind, cut.point, evidence) if before * after < 0.0 else None
 
@@ -273,36 +273,36 @@ def _leads_away(point: OrbitPoint, ahead: OrbitPoint, probe: float) -> bool:
     return point.curve.norm(chord) < SETTINGS.near * probe and float(ahead.tangent @ (point.curve.weights**2 * chord)) > 0.0
 
 
-def _is_discontinuous(equations: FollowedEquations) -> bool:
+def _is_discontinuous(evaluation: WholeMotionEvaluation) -> bool:
     """Whether the map jumps: a motion that begins very near to an orbit ends away from it."""
-    return bool(np.abs(equations.residual).max() > SETTINGS.jump)
+    return bool(np.abs(evaluation.residual).max() > SETTINGS.jump)
 
 
-def _beside(point: OrbitPoint, sequence: EventSequence | None) -> Iterator[tuple[np.ndarray, FollowedEquations]]:
+def _beside(point: OrbitPoint, sequence: EventSequence | None) -> Iterator[tuple[np.ndarray, WholeMotionEvaluation]]:
     """Places beside a point, with the equations evaluated there, where the events differ from `sequence` or the map jumps: one
     place for each such sequence at each distance. State variables that are held at the section stay held, as on all nearby
     orbits."""
-    problem = point.curve.problem
-    assert isinstance(problem, FollowedProblem)
-    held = problem.held(point.solution.unknowns, problem.at(point.parameters))
+    equations = point.curve.equations
+    assert isinstance(equations, WholeMotionEquations)
+    held = equations.held(point.solution.unknowns, equations.at(point.parameters))
     axes = np.delete(np.eye(len(point.place)) / point.curve.weights, list(held), axis=0)
     for distance in SETTINGS.beside:
         known = set()
         for direction in (point.tangent, -point.tangent, *axes, *-axes):
             place = point.place + distance * direction
-            equations = point.curve.evaluate(place, thorough=True)
-            if equations is None:
+            evaluation = point.curve.evaluate(place, thorough=True)
+            if evaluation is None:
                 continue
-            kind = events_of_equations(equations).sequence, _is_discontinuous(equations)
+            kind = events_of_evaluation(evaluation).sequence, _is_discontinuous(evaluation)
             if kind != (sequence, False) and kind not in known:
                 known.add(kind)
-                yield place, equations
+                yield place, evaluation
 
 
-def events_of_equations(equations: FollowedEquations) -> FollowedEvents:
+def events_of_evaluation(evaluation: WholeMotionEvaluation) -> FollowedEvents:
     """The events in equations that were evaluated with extremes."""
-    assert equations.followed is not None
-    return equations.followed
+    assert evaluation.followed is not None
+    return evaluation.followed
 
 
 def _section_comes(point: OrbitPoint) -> bool:
@@ -313,23 +313,23 @@ def _section_comes(point: OrbitPoint) -> bool:
 
 def _from_another_section(point: OrbitPoint) -> OrbitPoint | None:
     """The same orbit with its section at a phase farther from all events, and with its tangent there."""
-    problem = point.orbit.problem
-    assert isinstance(problem, FollowedProblem)
+    equations = point.orbit.equations
+    assert isinstance(equations, WholeMotionEquations)
     phase, state = section_of(point.orbit.motion(), point.orbit.frequency)
-    moved = problem.with_signature(replace(problem.signature, section=phase))
-    assert isinstance(moved, FollowedProblem)
+    moved = equations.with_signature(replace(equations.signature, section=phase))
+    assert isinstance(moved, WholeMotionEquations)
     near = point.beside(SETTINGS.along)
     first = PeriodicOrbit.near(moved, state, point.parameters)
     if near is None or first is None:
         return None
     # both states in the same forcing period: otherwise the tangent would lead from one state of the orbit to another state of it
-    guess = problem.state_at(phase, near.solution.unknowns, near.parameters, first.solution.unknowns)
+    guess = equations.state_at(phase, near.solution.unknowns, near.parameters, first.solution.unknowns)
     second = None if guess is None else PeriodicOrbit.near(moved, guess, near.parameters)
     if second is None:
         return None
     solution, apart = first.solution, second.solution.unknowns - first.solution.unknowns
-    found = Corrected(np.append(solution.unknowns, solution.values), solution.equations, solution.iterations)
-    curve = point.curve.with_problem(moved)
+    found = Corrected(np.append(solution.unknowns, solution.values), solution.evaluation, solution.iterations)
+    curve = point.curve.with_equations(moved)
     there: OrbitPoint | None = curve.with_tangent(found, np.append(apart, near.parameters - point.parameters) / SETTINGS.along)
     return there
 

@@ -13,11 +13,11 @@ import numpy as np
 
 from saltus.errors import MotionError
 from saltus.flow import RECURRENCE, last_states, motions_from
-from saltus.orbits.contact_problem import problem_of
-from saltus.orbits.find import orbit_from
+from saltus.orbits.equations.contacts import equations_of
+from saltus.orbits.finding.from_motion import orbit_from
+from saltus.orbits.finding.starts import held_by_contacts, start_at, states_beside
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
-from saltus.orbits.starts import held_by_contacts, start_at, states_beside
 from saltus.orbits.verify import same_orbit
 from saltus.systems import System
 
@@ -82,7 +82,7 @@ def orbits_near_returns(
 def solved_near(system: System, path: str, state: np.ndarray, period: int) -> PeriodicOrbit | None:
     """The orbit of a system near a state at phase 0 that nearly repeats itself, to be followed along a parameter; or None."""
     try:
-        orbit = orbit_from(problem_of(system, Signature((), 1), (path,)), start_at(system, state), period)
+        orbit = orbit_from(equations_of(system, Signature((), 1), (path,)), start_at(system, state), period)
     except MotionError:
         return None
     return orbit if orbit is not None and orbit.admissible and orbit.amplitude > SETTINGS.still else None
@@ -143,11 +143,11 @@ def _mapped_singly(
     system: System, path: str, values: np.ndarray, states: np.ndarray, period: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """As `_mapped`, one motion after the other; nan where a motion cannot be followed or has no derivatives."""
-    problem = problem_of(system, Signature((), period, section=0.0), (path,), SETTINGS.tol)
+    equations = equations_of(system, Signature((), period, section=0.0), (path,), SETTINGS.tol)
     held = held_by_contacts(system, states)
     ends, slopes = np.full(states.shape, np.nan), np.full((*states.shape, states.shape[1]), np.nan)
     for i, (value, state) in enumerate(zip(values, states, strict=True)):
-        equations = problem.evaluate(state, np.array([value]))
-        if equations is not None:
-            ends[i], slopes[i] = state + equations.residual, np.where(held[i], 0.0, equations.here[0])
+        evaluation = equations.evaluate(state, np.array([value]))
+        if evaluation is not None:
+            ends[i], slopes[i] = state + evaluation.residual, np.where(held[i], 0.0, evaluation.here[0])
     return ends, slopes

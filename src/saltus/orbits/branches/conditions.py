@@ -1,6 +1,6 @@
 """The additional equation that holds at special orbits only, along curves in two parameters, and its derivatives.
 
-With the orbit's equations F(y, p) = 0 (`problem.py`; J is the matrix of their derivatives to the unknowns y) it is one of
+With the orbit's equations F(y, p) = 0 (`equations/`; J is the matrix of their derivatives to the unknowns y) it is one of
 
     fold LP:  g = 0 of  [[J, b], [c^T, 0]] (u, g) = (0, 1),         grazing GR:  v_i = 0;
 
@@ -17,9 +17,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from saltus.orbits.newton import Solution
+from saltus.orbits.equations.newton import Solution
+from saltus.orbits.equations.one_contact import OneContactEquations, OrbitEvaluation
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.problem import Equations, Problem
 
 
 @dataclass(frozen=True)
@@ -52,15 +52,15 @@ class Singular:
     """The condition that a perturbation returns after the period of the equations: as it was (closing +1), or with the other sign
     (-1)."""
 
-    problem: Problem
+    equations: OneContactEquations
     closing: float
     border: tuple[np.ndarray, np.ndarray]
 
     @classmethod
     def near(cls, orbit: PeriodicOrbit, closing: float) -> Singular:
         """The condition bordered by the null vectors of an orbit at which it nearly holds."""
-        left, _, right = np.linalg.svd(orbit.solution.equations.jacobian(closing))
-        return cls(orbit.problem, closing, (left[:, -1], right[-1]))
+        left, _, right = np.linalg.svd(orbit.solution.evaluation.jacobian(closing))
+        return cls(orbit.equations, closing, (left[:, -1], right[-1]))
 
     def moved(self, at: ConditionValue) -> Singular:
         """The condition bordered by the null vectors of a later point."""
@@ -69,9 +69,9 @@ class Singular:
 
     def evaluate(self, solution: Solution) -> ConditionValue | None:
         """g and its derivatives, or None where the motion cannot be followed."""
-        n = self.problem.size
+        n = self.equations.size
         matrix = np.zeros((n + 1, n + 1))
-        matrix[:n, :n], (matrix[:n, n], matrix[n, :n]) = solution.equations.jacobian(self.closing), self.border
+        matrix[:n, :n], (matrix[:n, n], matrix[n, :n]) = solution.evaluation.jacobian(self.closing), self.border
         unit = np.append(np.zeros(n), 1.0)
         try:
             right, left = np.linalg.solve(matrix, unit), np.linalg.solve(matrix.T, unit)
@@ -91,14 +91,14 @@ class Singular:
         beside = self.beside(solution, SETTINGS.shift * vector)
         if beside is None:
             return None
-        ahead, behind = (equations.jacobian(self.closing) @ vector for equations in beside)
+        ahead, behind = (evaluation.jacobian(self.closing) @ vector for evaluation in beside)
         return np.asarray((ahead - behind) / (2.0 * SETTINGS.shift))
 
-    def beside(self, solution: Solution, shift: np.ndarray) -> tuple[Equations, Equations] | None:
+    def beside(self, solution: Solution, shift: np.ndarray) -> tuple[OrbitEvaluation, OrbitEvaluation] | None:
         """The equations of two motions that begin at +shift and -shift from an orbit, and return shifted as `closing` says."""
         both = (solution.unknowns + shift, solution.unknowns - shift)
         ends = both if self.closing > 0 else both[::-1]
-        ahead, behind = (self.problem.evaluate(y, solution.values, later=end) for y, end in zip(both, ends, strict=True))
+        ahead, behind = (self.equations.evaluate(y, solution.values, later=end) for y, end in zip(both, ends, strict=True))
         return None if ahead is None or behind is None else (ahead, behind)
 
 
@@ -106,7 +106,7 @@ class Singular:
 class Slow:
     """The condition that impact `index` has no speed: a grazing, in the signature that has this impact."""
 
-    problem: Problem
+    equations: OneContactEquations
     index: int
 
     def moved(self, at: ConditionValue) -> Slow:
@@ -115,7 +115,7 @@ class Slow:
 
     def evaluate(self, solution: Solution) -> ConditionValue:
         """v_i."""
-        gradient = np.zeros(self.problem.size + len(self.problem.paths))
+        gradient = np.zeros(self.equations.size + len(self.equations.paths))
         gradient[2 * self.index + 1] = 1.0
         return ConditionValue(float(solution.unknowns[2 * self.index + 1]), gradient, np.empty(0), np.empty(0))
 
@@ -141,7 +141,7 @@ def cubic(condition: Singular, solution: Solution, at: ConditionValue) -> float:
     if curvature is None:
         return math.nan
     try:
-        h = np.linalg.solve(solution.equations.jacobian(), -curvature)
+        h = np.linalg.solve(solution.evaluation.jacobian(), -curvature)
     except np.linalg.LinAlgError:
         return math.nan
     step = min(SETTINGS.long_shift, math.sqrt(0.5 * SETTINGS.farthest / max(float(np.linalg.norm(h)), 1e-300)))
@@ -150,8 +150,8 @@ def cubic(condition: Singular, solution: Solution, at: ConditionValue) -> float:
 
     def third(a: float) -> float:
         one, other = (solution.unknowns + s * a * u + 0.5 * a**2 * h for s in (1, -1))
-        first = condition.problem.evaluate(one, solution.values, later=other)
-        second = condition.problem.evaluate(other, solution.values, later=one)
+        first = condition.equations.evaluate(one, solution.values, later=other)
+        second = condition.equations.evaluate(other, solution.values, later=one)
         return math.nan if first is None or second is None else 3.0 * float(d @ (first.residual - second.residual)) / a**3
 
     return (4.0 * third(step) - third(2.0 * step)) / 3.0

@@ -26,9 +26,9 @@ from saltus.flow import (
     program,
     state_rates,
 )
-from saltus.orbits.followed_events import FollowedEvents, events_of
-from saltus.orbits.problem import Equations, Problem
-from saltus.orbits.sampled_motion import SampledMotion
+from saltus.orbits.equations.event_sequence import FollowedEvents, events_of
+from saltus.orbits.equations.one_contact import OneContactEquations, OrbitEvaluation
+from saltus.orbits.equations.sampled_motion import SampledMotion
 from saltus.systems import System, image_of
 from saltus.taylor import FREQUENCY
 
@@ -37,31 +37,31 @@ CLOSED = 1e-9  # A contact is closed at the section if its gap and the gap's rat
 
 
 @dataclass(frozen=True)
-class FollowedEquations(Equations):
+class WholeMotionEvaluation(OrbitEvaluation):
     """The problem at one point, with the events along the motion."""
 
     followed: FollowedEvents | None  # None if extremes were not asked for
     middle: np.ndarray | None  # the state after half of the time; None if extremes were not asked for
 
 
-class FollowedProblem(Problem):
+class WholeMotionEquations(OneContactEquations):
     """The equations x = Phi(x) of a system with contacts or frictions; for a symmetric orbit x is the mirror image of Phi(x) over
     half a period."""
 
     stray = 0.5  # Where the map jumps, the corrector wanders; this is ten times the accepted distance from the predicted point.
     rounded = 1e-7  # What rounding leaves where multipliers are 1e8 to 1e9, as they become towards some changes of events.
     # The last place at which the equations were evaluated, with the result: they are often asked for again with the extremes.
-    _latest: tuple[np.ndarray, tuple[Motion, FollowedEquations] | None] | None = None
+    _latest: tuple[np.ndarray, tuple[Motion, WholeMotionEvaluation] | None] | None = None
 
     @property
     def size(self) -> int:
         return 2 * self.own
 
-    def impacts(self, unknowns: np.ndarray, equations: Equations) -> tuple[np.ndarray, np.ndarray]:
-        times, speeds = equations.ends[:, 0], equations.ends[:, 1]
+    def impacts(self, unknowns: np.ndarray, evaluation: OrbitEvaluation) -> tuple[np.ndarray, np.ndarray]:
+        times, speeds = evaluation.ends[:, 0], evaluation.ends[:, 1]
         return times * self.frequency(self.values), speeds
 
-    def touching_speed(self, unknowns: np.ndarray, equations: Equations) -> float:
+    def touching_speed(self, unknowns: np.ndarray, evaluation: OrbitEvaluation) -> float:
         return math.inf
 
     def held(self, state: np.ndarray, system: System) -> dict[int, float]:
@@ -84,32 +84,32 @@ class FollowedProblem(Problem):
             state[place] = value
         return state
 
-    def within(self, unknowns: np.ndarray, equations: Equations, values: np.ndarray) -> tuple[np.ndarray, float]:
+    def within(self, unknowns: np.ndarray, evaluation: OrbitEvaluation, values: np.ndarray) -> tuple[np.ndarray, float]:
         """The state at the section, and its time."""
         return self.start_state(unknowns, self.at(values)), float(self.signature.section or 0.0) / self.frequency(values)
 
     def evaluate(
         self, unknowns: np.ndarray, values: np.ndarray, with_extremes: bool = False, *, later: np.ndarray | None = None
-    ) -> FollowedEquations | None:
+    ) -> WholeMotionEvaluation | None:
         if later is not None:
-            equations = self.evaluate(unknowns, values, with_extremes)
-            return None if equations is None else replace(equations, residual=equations.residual + unknowns - later)
+            evaluation = self.evaluate(unknowns, values, with_extremes)
+            return None if evaluation is None else replace(evaluation, residual=evaluation.residual + unknowns - later)
         place = np.append(unknowns, values)
         if self._latest is None or not np.array_equal(self._latest[0], place):
             self._latest = place, self._evaluated(unknowns, values)
         _, found = self._latest
         if found is None or not with_extremes:
             return None if found is None else found[1]
-        motion, equations = found
-        if equations.followed is None:
+        motion, evaluation = found
+        if evaluation.followed is None:
             sampled, half = SampledMotion.of(motion), motion.at(0.5 * (motion.start + motion.time))
             events = events_of(motion, sampled, self.images if self.signature.symmetric else None)
             middle, extremes = np.concatenate([np.atleast_1d(part) for part in half]), self._extremes(sampled)
-            equations = replace(equations, extremes=extremes, followed=events, middle=middle)
-            self._latest = place, (motion, equations)
-        return equations
+            evaluation = replace(evaluation, extremes=extremes, followed=events, middle=middle)
+            self._latest = place, (motion, evaluation)
+        return evaluation
 
-    def _evaluated(self, unknowns: np.ndarray, values: np.ndarray) -> tuple[Motion, FollowedEquations] | None:
+    def _evaluated(self, unknowns: np.ndarray, values: np.ndarray) -> tuple[Motion, WholeMotionEvaluation] | None:
         """The motion over the time that the equations cover, and the equations without extremes; None where the motion cannot be
         followed."""
         frequency = self.frequency(values)
@@ -133,13 +133,13 @@ class FollowedProblem(Problem):
             after, state, parameters = (image_of(system.model, numbers.T).T for numbers in (after, state, parameters))
         here, there = state[None], -np.eye(len(after))[None]
         residual, impacts = after - unknowns, self._impacts(motion)
-        return motion, FollowedEquations(residual, here, there, parameters, impacts, self._extremes(None), None, None)
+        return motion, WholeMotionEvaluation(residual, here, there, parameters, impacts, self._extremes(None), None, None)
 
-    def half_way(self, unknowns: np.ndarray, values: np.ndarray, equations: Equations) -> np.ndarray | None:
-        assert isinstance(equations, FollowedEquations)
-        if equations.middle is None:
-            return super().half_way(unknowns, values, equations)
-        middle = equations.middle
+    def half_way(self, unknowns: np.ndarray, values: np.ndarray, evaluation: OrbitEvaluation) -> np.ndarray | None:
+        assert isinstance(evaluation, WholeMotionEvaluation)
+        if evaluation.middle is None:
+            return super().half_way(unknowns, values, evaluation)
+        middle = evaluation.middle
         return np.asarray((image_of(self.system.model, middle) if self.signature.period % 2 else middle) - unknowns)
 
     def state_at(self, phase: float, unknowns: np.ndarray, values: np.ndarray, near: np.ndarray) -> np.ndarray | None:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from saltus.flow import EventCode, Motion, modes_of
-from saltus.orbits.sampled_motion import ONE_INSTANT, SampledMotion
+from saltus.orbits.equations.sampled_motion import ONE_INSTANT, SampledMotion
 from saltus.systems import Model
 
 CHANGES = (

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.continuation import newton
-from saltus.orbits.problem import Equations, Problem
+from saltus.orbits.equations.one_contact import OneContactEquations, OrbitEvaluation
 
 NEWTON_ITERATIONS = 12  # enough from a guess near the orbit; a motion that has not quite settled needs more
 
@@ -18,22 +18,24 @@ class Solution:
 
     unknowns: np.ndarray
     values: np.ndarray  # of the parameters
-    equations: Equations
+    evaluation: OrbitEvaluation
     iterations: int
 
     @property
     def residual(self) -> float:
         """The largest residual."""
-        return float(np.abs(self.equations.residual).max())
+        return float(np.abs(self.evaluation.residual).max())
 
 
-def solve(problem: Problem, unknowns: np.ndarray, values: np.ndarray, iterations: int = NEWTON_ITERATIONS) -> Solution | None:
+def solve(
+    equations: OneContactEquations, unknowns: np.ndarray, values: np.ndarray, iterations: int = NEWTON_ITERATIONS
+) -> Solution | None:
     """The orbit near a first guess at fixed parameters, or None where Newton's method does not converge."""
 
-    def evaluate(place: np.ndarray, thorough: bool) -> Equations | None:
-        return problem.evaluate(place, values, with_extremes=thorough)
+    def evaluate(place: np.ndarray, thorough: bool) -> OrbitEvaluation | None:
+        return equations.evaluate(place, values, with_extremes=thorough)
 
-    def linear(found: Equations, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def linear(found: OrbitEvaluation, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return found.jacobian(), -found.residual
 
     found = newton(evaluate, linear, unknowns, iterations)

@@ -11,9 +11,9 @@ import numpy as np
 from saltus.checks import check_count, check_path, check_starts
 from saltus.errors import ParameterError
 from saltus.flow import Recurrence, find_recurrence
-from saltus.orbits.near_returns import orbits_near_returns, solved_near
+from saltus.orbits.finding.near_returns import orbits_near_returns, solved_near
+from saltus.orbits.finding.starts import initial_states, is_still, rest_state
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.starts import initial_states, is_still, rest_state
 from saltus.orbits.verify import same_orbit
 from saltus.progress import Progress, silent
 from saltus.result import Result, result_dataset

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from saltus.flow import SegmentEnd, SegmentExtremes, SegmentPlan
-from saltus.orbits.contact_problem import AFTER_RELEASE, ContactEquations, ContactProblem, bounces
-from saltus.orbits.orbit_curve import OrbitPoint
+from saltus.orbits.branches.orbit_curve import OrbitPoint
+from saltus.orbits.branches.special_point import SpecialKind
+from saltus.orbits.equations.contacts import AFTER_RELEASE, ContactsEquations, ContactsEvaluation, bounces
 from saltus.orbits.signature import ModeChange, Signature
-from saltus.orbits.special_point import SpecialKind
 from saltus.orbits.tolerances import TOLERANCES
 
 
@@ -32,18 +32,18 @@ class Switching:
     """An orbit at which an event appears or is lost."""
 
     point: OrbitPoint
-    problem: ContactProblem
-    equations: ContactEquations
+    equations: ContactsEquations
+    evaluation: ContactsEvaluation
     events: tuple[Timed, ...]
 
     @classmethod
     def at(cls, point: OrbitPoint) -> Switching:
         """A point of a curve, with its equations and its events."""
-        problem, equations = point.orbit.problem, point.solution.equations
-        assert isinstance(problem, ContactProblem)
-        assert isinstance(equations, ContactEquations)
-        phases = problem.split(point.solution.unknowns)[1].tolist()
-        return cls(point, problem, equations, tuple(map(Timed, problem.signature.events, phases)))
+        equations, evaluation = point.orbit.equations, point.solution.evaluation
+        assert isinstance(equations, ContactsEquations)
+        assert isinstance(evaluation, ContactsEvaluation)
+        phases = equations.split(point.solution.unknowns)[1].tolist()
+        return cls(point, equations, evaluation, tuple(map(Timed, equations.signature.events, phases)))
 
     def other_signatures(self) -> Iterator[list[Timed]]:
         """The events that the orbit may have on the other side, the likely ones first."""
@@ -55,13 +55,13 @@ class Switching:
     def _together(self) -> Iterator[list[Timed]]:
         """The events beyond a point at which two successive events have come together."""
         events, n = list(self.events), len(self.events)
-        symmetric = self.problem.signature.symmetric
+        symmetric = self.equations.signature.symmetric
         for i in range(n if n > 1 else 0):
             j = (i + 1) % n
             if symmetric and j == 0:
                 continue  # the second event lies in the other half: `from_next_event` makes them neighbours
             first, second = events[i], events[j]
-            apart = second.phase - first.phase + (self.problem.closing if j == 0 else 0.0)
+            apart = second.phase - first.phase + (self.equations.closing if j == 0 else 0.0)
             if abs(apart) > TOLERANCES.switching:
                 continue
             one, other = first.event, second.event
@@ -78,12 +78,12 @@ class Switching:
     def _before(self, i: int) -> int:
         """The contacts that are closed before an event."""
         event = self.events[i - 1].event
-        return (event.image(self.problem.images) if i == 0 and self.problem.signature.symmetric else event).closed
+        return (event.image(self.equations.images) if i == 0 and self.equations.signature.symmetric else event).closed
 
     def _without_pull(self) -> Iterator[list[Timed]]:
         """The events beyond a point at which a contact closes with no reaction or opens with no acceleration, or at which its
         reaction has vanished at the end of a segment."""
-        events, seen = list(self.events), self.equations.seen
+        events, seen = list(self.events), self.evaluation.seen
         for s in range(len(events)):
             here = events[s]
             if abs(seen[s, SegmentExtremes.PULL]) < TOLERANCES.touch:
@@ -93,50 +93,50 @@ class Switching:
                 yield [*events[:s], here.leaving(changed), replace(here, event=again), *events[s + 1 :]]
             if abs(seen[s, SegmentExtremes.TAIL]) < TOLERANCES.touch:
                 contact, following = int(seen[s, SegmentExtremes.TAIL + 1]), events[(s + 1) % len(events)]
-                phase = following.phase + (self.problem.closing if s + 1 == len(events) else 0.0)
+                phase = following.phase + (self.equations.closing if s + 1 == len(events) else 0.0)
                 release = ModeChange(False, contact, here.event.closed & ~(1 << contact))
                 yield [*events[: s + 1], Timed(release, phase), *events[s + 1 :]]
 
     def _without_speed(self) -> Iterator[list[Timed]]:
         """The events without an impact that has lost its speed."""
         for i, timed in enumerate(self.events):
-            slow = abs(self.equations.ends[i - 1, SegmentEnd.RATE]) < TOLERANCES.touch
+            slow = abs(self.evaluation.ends[i - 1, SegmentEnd.RATE]) < TOLERANCES.touch
             if timed.event.is_impact and slow and timed.event.closed == self._before(i):
                 yield _changed(list(self.events), {i: None})
 
     def _touching(self) -> Iterator[list[Timed]]:
         """The events with an additional impact where a gap touches 0, or with a release and an impact where a reaction does."""
-        events, seen = list(self.events), self.equations.seen
-        frequency = self.problem.frequency(self.point.solution.values)
+        events, seen = list(self.events), self.evaluation.seen
+        frequency = self.equations.frequency(self.point.solution.values)
         for place in (SegmentExtremes.GAP, SegmentExtremes.FORCE):
             s = int(np.argmin(seen[:, place]))
             if abs(seen[s, place]) > TOLERANCES.touch:
                 continue
-            contact, closed = int(seen[s, place + 2]), int(self.problem.plan[s, SegmentPlan.ALONG])
+            contact, closed = int(seen[s, place + 2]), int(self.equations.plan[s, SegmentPlan.ALONG])
             phase, at = float(seen[s, place + 1]) * frequency, s + 1 if events else 0
             new = [Timed(ModeChange(True, contact, closed), phase)]
             if place == SegmentExtremes.FORCE:
-                if bounces(self.problem.system, contact):
+                if bounces(self.equations.system, contact):
                     continue  # the contact would bounce to rest after each closing, for which there are no equations yet
                 new = [Timed(ModeChange(False, contact, closed & ~(1 << contact)), phase), *new]
             yield [*events[:at], *new, *events[at:]]
 
-    def problem_with(self, events: list[Timed]) -> tuple[ContactProblem, np.ndarray] | None:
+    def equations_with(self, events: list[Timed]) -> tuple[ContactsEquations, np.ndarray] | None:
         """The problem with these events and its unknowns at this orbit; None where its motion cannot be followed."""
-        closed = int(self.problem.plan[0, SegmentPlan.ALONG])
-        changes, period = tuple(timed.event for timed in events), self.problem.signature.period
-        symmetric = self.problem.signature.symmetric
+        closed = int(self.equations.plan[0, SegmentPlan.ALONG])
+        changes, period = tuple(timed.event for timed in events), self.equations.signature.period
+        symmetric = self.equations.signature.symmetric
         signature = Signature((), period, symmetric, events=changes, closed=0 if events else closed)
-        other = self.problem.with_signature(signature)
-        assert isinstance(other, ContactProblem)
+        other = self.equations.with_signature(signature)
+        assert isinstance(other, ContactsEquations)
         phases = np.array([timed.phase for timed in events])
         state = self._state_after(events[0]) if events else self._state_at(0.0)
         return None if state is None else (other, other.joined(state, phases))
 
     def _state_after(self, first: Timed) -> np.ndarray | None:
         """The state of the orbit just after the first of the events of the other side."""
-        n = 2 * self.problem.own
-        for timed, end in zip(self.events, self.equations.ends, strict=False):
+        n = 2 * self.equations.own
+        for timed, end in zip(self.events, self.evaluation.ends, strict=False):
             same = (timed.event.is_impact, timed.event.contact) == (first.event.is_impact, first.event.contact)
             if same and abs(timed.phase - first.phase) < TOLERANCES.switching:
                 return np.asarray(end[SegmentEnd.NUMBERS : SegmentEnd.NUMBERS + n])
@@ -144,24 +144,24 @@ class Switching:
 
     def _state_at(self, phase: float) -> np.ndarray | None:
         """The state at a phase of an orbit without events; for an orbit with a single event, the state at the next phase 0."""
-        frequency, n = self.problem.frequency(self.point.solution.values), 2 * self.problem.own
+        frequency, n = self.equations.frequency(self.point.solution.values), 2 * self.equations.own
         begin = self.events[0].phase if self.events else 0.0
         end = phase if not self.events else 2.0 * np.pi * np.ceil(begin / (2.0 * np.pi))
-        closed, start = int(self.problem.plan[0, SegmentPlan.ALONG]), self.equations.ends[0, SegmentEnd.NUMBERS :][:n]
-        return self.problem.carried_along(start, closed, np.array([begin, end]) / frequency, self.point.solution.values)
+        closed, start = int(self.equations.plan[0, SegmentPlan.ALONG]), self.evaluation.ends[0, SegmentEnd.NUMBERS :][:n]
+        return self.equations.carried_along(start, closed, np.array([begin, end]) / frequency, self.point.solution.values)
 
 
 def from_next_event(point: OrbitPoint) -> OrbitPoint:
     """The same symmetric orbit in the equations of the half that begins with its second event."""
     here = Switching.at(point)
     phases = [timed.phase for timed in here.events]
-    events = (*here.problem.signature.events[1:], here.problem.signature.events[0].image(here.problem.images))
-    problem = here.problem.with_signature(replace(here.problem.signature, events=events))
-    assert isinstance(problem, ContactProblem)
-    place = SegmentEnd.NUMBERS + 8 * problem.own
-    state = here.equations.ends[0, place : place + 2 * problem.own]
-    curve = point.curve.with_problem(problem)
-    found = curve.known(problem.joined(state, np.array([*phases[1:], phases[0] + problem.closing])), point.parameters)
+    events = (*here.equations.signature.events[1:], here.equations.signature.events[0].image(here.equations.images))
+    equations = here.equations.with_signature(replace(here.equations.signature, events=events))
+    assert isinstance(equations, ContactsEquations)
+    place = SegmentEnd.NUMBERS + 8 * equations.own
+    state = here.evaluation.ends[0, place : place + 2 * equations.own]
+    curve = point.curve.with_equations(equations)
+    found = curve.known(equations.joined(state, np.array([*phases[1:], phases[0] + equations.closing])), point.parameters)
     assert found is not None, "an orbit can be followed from each of its events"
     turned: OrbitPoint = curve.along_kernel(found)
     return turned
@@ -178,12 +178,12 @@ def cycle_of(signature: Signature) -> Cycle:
 
 def begins_excursion(point: OrbitPoint) -> bool:
     """Whether a point has an excursion of no duration after a release: its multipliers and its tangent then have no meaning."""
-    problem = point.orbit.problem
-    if not isinstance(problem, ContactProblem) or not problem.signature.events:
+    equations = point.orbit.equations
+    if not isinstance(equations, ContactsEquations) or not equations.signature.events:
         return False
-    phases = problem.split(point.solution.unknowns)[1]
-    apart = np.diff(np.append(phases, phases[:1] + problem.closing))
-    return bool((apart[problem.plan[:, SegmentPlan.POWER] == AFTER_RELEASE] < TOLERANCES.switching).any())
+    phases = equations.split(point.solution.unknowns)[1]
+    apart = np.diff(np.append(phases, phases[:1] + equations.closing))
+    return bool((apart[equations.plan[:, SegmentPlan.POWER] == AFTER_RELEASE] < TOLERANCES.switching).any())
 
 
 def _changed(events: list[Timed], new: dict[int, Timed | None]) -> list[Timed]:

@@ -10,40 +10,40 @@ import numpy as np
 
 from saltus.continuation import STEPS, Corrected, EquationCurve, Point
 from saltus.flow import SegmentValue
-from saltus.orbits.newton import Solution
+from saltus.orbits.branches.special_point import SpecialPoint
+from saltus.orbits.equations.newton import Solution
+from saltus.orbits.equations.one_contact import OneContactEquations, OrbitEvaluation
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.problem import Equations, Problem
-from saltus.orbits.special_point import SpecialPoint
 
 
 @dataclass(frozen=True, eq=False)
 class OrbitPoint(Point):
     """An orbit as a point of a curve: `place` is its unknowns and the parameters."""
 
-    equations: Equations
+    evaluation: OrbitEvaluation
 
     zero_type = SpecialPoint
 
     @cached_property
     def solution(self) -> Solution:
         """The solution of the orbit's equations."""
-        n = self.curve.problem.size
-        return Solution(self.place[:n], self.place[n:], self.equations, self.iterations)
+        n = self.curve.equations.size
+        return Solution(self.place[:n], self.place[n:], self.evaluation, self.iterations)
 
     @cached_property
     def orbit(self) -> PeriodicOrbit:
         """The orbit."""
-        return PeriodicOrbit(self.curve.problem, self.solution)
+        return PeriodicOrbit(self.curve.equations, self.solution)
 
     @cached_property
     def half_way(self) -> np.ndarray | None:
         """The difference of the image of an orbit without impacts from the orbit; None where it cannot be its own image."""
-        problem, odd = self.curve.problem, self.orbit.signature.period % 2
-        sides = problem.system.model.sides and not problem.passes_contact
-        if problem.signature.sides or problem.signature.closed or (odd and (sides or not self.curve.symmetric)):
+        equations, odd = self.curve.equations, self.orbit.signature.period % 2
+        sides = equations.system.model.sides and not equations.passes_contact
+        if equations.signature.sides or equations.signature.closed or (odd and (sides or not self.curve.symmetric)):
             return None
-        n = problem.size
-        half_way: np.ndarray | None = problem.half_way(self.place[:n], self.place[n:], self.equations)
+        n = equations.size
+        half_way: np.ndarray | None = equations.half_way(self.place[:n], self.place[n:], self.evaluation)
         return half_way
 
     @property
@@ -57,7 +57,7 @@ class OrbitCurve(EquationCurve[OrbitPoint]):
     """The orbits of one problem along its parameters, measured by a norm that depends neither on the number of impacts nor on
     the units of the parameters."""
 
-    problem: Problem
+    equations: OneContactEquations
     scales: tuple[float, ...]  # of the parameters
     symmetric: bool = False  # whether the system has the mirror symmetry all along it
 
@@ -69,23 +69,23 @@ class OrbitCurve(EquationCurve[OrbitPoint]):
     @property
     def stray(self) -> float:  # type: ignore[override]
         """How far from the predicted point the corrector may look for the next one."""
-        return self.problem.stray
+        return self.equations.stray
 
     @property
     def rounded(self) -> float:  # type: ignore[override]
         """The largest residual that rounding may leave."""
-        return self.problem.rounded
+        return self.equations.rounded
 
     @cached_property
     def weights(self) -> np.ndarray:
         """The weights of the unknowns and the parameters in the norm."""
-        n = self.problem.size
+        n = self.equations.size
         return np.append(np.full(n, (2.0 / n) ** 0.5), 1.0 / np.array(self.scales))
 
     def evaluate(self, place: np.ndarray, thorough: bool) -> Any:
         """The orbit's equations, with the extrema between the impacts if `thorough`."""
-        n = self.problem.size
-        return self.problem.evaluate(place[:n], place[n:], with_extremes=thorough)
+        n = self.equations.size
+        return self.equations.evaluate(place[:n], place[n:], with_extremes=thorough)
 
     def point_at(self, found: Corrected[Any], tangent: np.ndarray) -> OrbitPoint:
         return OrbitPoint(self, found.place, tangent, found.iterations, found.evaluation)
@@ -94,7 +94,7 @@ class OrbitCurve(EquationCurve[OrbitPoint]):
         """The point a step further. A short step may go round a corner of the curve, where the state at phase 0 passes the
         contact (see `_seen_from`)."""
         ahead = super().advance(before, point, step)
-        if ahead is not None or step > STEPS.restart or not self.problem.passes_contact:
+        if ahead is not None or step > STEPS.restart or not self.equations.passes_contact:
             return ahead
         ahead = self.solve(point.place + step * point.tangent, point.tangent)
         if ahead is None or self.norm(ahead.place - point.place) > 2.0 * step:
@@ -104,19 +104,19 @@ class OrbitCurve(EquationCurve[OrbitPoint]):
     def turn(self, a: OrbitPoint, b: OrbitPoint) -> float:
         """The angle between the tangents, without the part that such a corner makes."""
         angle = super().turn(a, b)
-        if not self.problem.passes_contact or self.norm(b.place - a.place) > 2.0 * STEPS.restart:
+        if not self.equations.passes_contact or self.norm(b.place - a.place) > 2.0 * STEPS.restart:
             return angle
         return min(angle, super().turn(a, _seen_from(a, b)))
 
-    def with_problem(self, problem: Problem) -> OrbitCurve:
+    def with_equations(self, equations: OneContactEquations) -> OrbitCurve:
         """The curve of another problem of the same system."""
-        return OrbitCurve(problem, self.scales, self.symmetric)
+        return OrbitCurve(equations, self.scales, self.symmetric)
 
-    def known(self, unknowns: np.ndarray, values: np.ndarray) -> Corrected[Equations] | None:
+    def known(self, unknowns: np.ndarray, values: np.ndarray) -> Corrected[OrbitEvaluation] | None:
         """An orbit whose unknowns are known, with its equations evaluated there; None where its motion cannot be followed."""
         place = np.concatenate([unknowns, values])
-        equations = self.evaluate(place, thorough=True)
-        return None if equations is None else Corrected(place, equations, 0)
+        evaluation = self.evaluate(place, thorough=True)
+        return None if evaluation is None else Corrected(place, evaluation, 0)
 
 
 def _seen_from(a: OrbitPoint, b: OrbitPoint) -> OrbitPoint:
@@ -126,8 +126,8 @@ def _seen_from(a: OrbitPoint, b: OrbitPoint) -> OrbitPoint:
     one side: the instant of the passage moves by -dx/v, and the velocity at phase 0 by that times the jump. The corner is in the
     unknowns alone, not in the orbit.
     """
-    own = a.curve.problem.own
-    first, second = (point.equations.ends[0, SegmentValue.FIRST_STATE + 3 * own :] for point in (a, b))
+    own = a.curve.equations.own
+    first, second = (point.evaluation.ends[0, SegmentValue.FIRST_STATE + 3 * own :] for point in (a, b))
     if own > 1 or second[1] == 0.0:
         return b
     tangent = b.tangent.copy()
@@ -137,8 +137,8 @@ def _seen_from(a: OrbitPoint, b: OrbitPoint) -> OrbitPoint:
 
 def start(orbit: PeriodicOrbit, symmetric: bool, scale: float) -> OrbitPoint:
     """A known orbit as the first point of its curve, to be followed towards larger parameters."""
-    curve = OrbitCurve(orbit.problem, (scale,), symmetric)
+    curve = OrbitCurve(orbit.equations, (scale,), symmetric)
     solution = orbit.solution
-    found = Corrected(np.append(solution.unknowns, solution.values), solution.equations, solution.iterations)
-    upwards = np.append(np.zeros(orbit.problem.size), scale)
+    found = Corrected(np.append(solution.unknowns, solution.values), solution.evaluation, solution.iterations)
+    upwards = np.append(np.zeros(orbit.equations.size), scale)
     return curve.with_tangent(found, upwards) or curve.along_kernel(found)

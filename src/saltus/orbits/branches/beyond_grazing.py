@@ -6,13 +6,13 @@ import numpy as np
 
 from saltus.continuation import End
 from saltus.flow import SegmentColumn
-from saltus.orbits.bifurcations import grazing
-from saltus.orbits.contact_problem import ContactProblem
-from saltus.orbits.orbit_curve import OrbitPoint
-from saltus.orbits.problem import Problem
+from saltus.orbits.branches.beyond_switching import Cycle, Switching, begins_excursion, cycle_of, from_next_event
+from saltus.orbits.branches.bifurcations import grazing
+from saltus.orbits.branches.orbit_curve import OrbitPoint
+from saltus.orbits.branches.special_point import OrbitEnd
+from saltus.orbits.equations.contacts import ContactsEquations
+from saltus.orbits.equations.one_contact import OneContactEquations
 from saltus.orbits.signature import Signature
-from saltus.orbits.special_point import OrbitEnd
-from saltus.orbits.switching_contacts import Cycle, Switching, begins_excursion, cycle_of, from_next_event
 from saltus.orbits.symmetry import full_point, half_point
 from saltus.orbits.tolerances import TOLERANCES
 
@@ -28,13 +28,13 @@ def other_side(point: OrbitPoint) -> OrbitPoint | End:
     Where the gap touches zero between impacts, the new signature has a pair of impacts without speed there, or a single one at a
     wall, which turns the motion round. Impacts that have lost their speed are left out of it.
     """
-    if isinstance(point.orbit.problem, ContactProblem):
+    if isinstance(point.orbit.equations, ContactsEquations):
         return _beyond_both_halves(point) if point.orbit.symmetric else _with_other_events(point)
     changed = removed(point) if point.orbit.slowest < TOLERANCES.touch else inserted(point)
     if isinstance(changed, End):
         return changed
-    problem, unknowns = changed
-    curve = point.curve.with_problem(problem)
+    equations, unknowns = changed
+    curve = point.curve.with_equations(equations)
     known = curve.known(unknowns, point.parameters)
     if known is None:
         return End(OrbitEnd.NO_MOTION, point.parameter, detail="on the other side of")
@@ -50,13 +50,13 @@ def _with_other_events(point: OrbitPoint, known: tuple[Cycle, ...] = ()) -> Orbi
     here, reason = Switching.at(point), OrbitEnd.TWO_AT_ONCE
     known = (*known, cycle_of(point.orbit.signature))
     for events in here.other_signatures():
-        found = here.problem_with(events)
+        found = here.equations_with(events)
         if found is None or cycle_of(found[0].signature) in known:
             continue
-        solved = point.curve.with_problem(found[0]).known(found[1], point.parameters)
+        solved = point.curve.with_equations(found[0]).known(found[1], point.parameters)
         if solved is None or not np.abs(solved.evaluation.residual).max() < TOLERANCES.switching:
             continue
-        reason, begun = OrbitEnd.NO_DIRECTION, point.curve.with_problem(found[0]).along_kernel(solved)
+        reason, begun = OrbitEnd.NO_DIRECTION, point.curve.with_equations(found[0]).along_kernel(solved)
         ahead = _admissible_direction(begun) or (_with_other_events(begun, known) if len(known) < MOST_TOGETHER else None)
         if isinstance(ahead, OrbitPoint):
             return ahead
@@ -84,46 +84,46 @@ def _admissible_direction(start: OrbitPoint) -> OrbitPoint | None:
     return None
 
 
-def _turns_round(problem: Problem, side: int) -> bool:
+def _turns_round(equations: OneContactEquations, side: int) -> bool:
     """Whether an impact stays on its side, as at a wall."""
-    model, load, impact = problem.system.model, problem.system.load, problem.system.impact
+    model, load, impact = equations.system.model, equations.system.load, equations.system.impact
     return bool(model.reset(0.0, 1.0, side, load, impact)[0] == side)
 
 
-def inserted(point: OrbitPoint) -> tuple[Problem, np.ndarray]:
+def inserted(point: OrbitPoint) -> tuple[OneContactEquations, np.ndarray]:
     """The problem whose signature has additional impacts where the gap touches zero, and its unknowns: they have no speed."""
-    problem, signature = point.orbit.problem, point.orbit.signature
-    extremes = point.equations.extremes
+    equations, signature = point.orbit.equations, point.orbit.signature
+    extremes = point.evaluation.extremes
     segment = int(np.argmin(extremes[:, SegmentColumn.LOWEST_GAP]))
-    phase = extremes[segment, SegmentColumn.LOWEST_GAP_TIME] * problem.frequency(point.solution.values)
+    phase = extremes[segment, SegmentColumn.LOWEST_GAP_TIME] * equations.frequency(point.solution.values)
     side = signature.along()[segment]
-    sides = (side,) if _turns_round(problem, side) else (side, -side)
+    sides = (side,) if _turns_round(equations, side) else (side, -side)
     touches = np.array([phase, 0.0] * len(sides))
     if not signature.sides:
-        return problem.with_signature(Signature(sides, signature.period)), touches
+        return equations.with_signature(Signature(sides, signature.period)), touches
     place = segment + 1
     longer = Signature((*signature.sides[:place], *sides, *signature.sides[place:]), signature.period, signature.symmetric)
     unknowns = point.solution.unknowns
-    return problem.with_signature(longer), np.concatenate([unknowns[: 2 * place], touches, unknowns[2 * place :]])
+    return equations.with_signature(longer), np.concatenate([unknowns[: 2 * place], touches, unknowns[2 * place :]])
 
 
-def removed(point: OrbitPoint) -> tuple[Problem, np.ndarray] | End:
+def removed(point: OrbitPoint) -> tuple[OneContactEquations, np.ndarray] | End:
     """The problem whose signature lacks the impacts that have lost their speed, and its unknowns; or why there is none."""
-    problem, signature = point.orbit.problem, point.orbit.signature
+    equations, signature = point.orbit.equations, point.orbit.signature
     n = len(signature.sides)
     phases, speeds = point.solution.unknowns[::2], point.solution.unknowns[1::2]
     slow = int(np.argmin(speeds))
-    if _turns_round(problem, signature.sides[slow]):
+    if _turns_round(equations, signature.sides[slow]):
         gone = [slow]
     else:
-        gone = _vanishing_pair(phases, speeds, slow, problem.closing)
+        gone = _vanishing_pair(phases, speeds, slow, equations.closing)
         if not gone:
             return End(OrbitEnd.NOT_UNIQUE, point.parameter)
     kept = [i for i in range(n) if i not in gone]
     if not kept:
         return _without_impacts(point, slow)
     shorter = Signature(tuple(signature.sides[i] for i in kept), signature.period, signature.symmetric)
-    return problem.with_signature(shorter), point.solution.unknowns.reshape(n, 2)[kept].ravel()
+    return equations.with_signature(shorter), point.solution.unknowns.reshape(n, 2)[kept].ravel()
 
 
 def _vanishing_pair(phases: np.ndarray, speeds: np.ndarray, slow: int, closing: float) -> list[int]:
@@ -137,18 +137,18 @@ def _vanishing_pair(phases: np.ndarray, speeds: np.ndarray, slow: int, closing: 
     return [slow, neighbour] if abs(distance) < TOLERANCES.pair and speeds[neighbour] < TOLERANCES.pair else []
 
 
-def _without_impacts(point: OrbitPoint, slow: int) -> tuple[Problem, np.ndarray] | End:
+def _without_impacts(point: OrbitPoint, slow: int) -> tuple[OneContactEquations, np.ndarray] | End:
     """An orbit that only touches the contact once a period, as an orbit without impacts: the problem and the state at phase 0."""
-    problem, signature = point.orbit.problem, point.orbit.signature
+    equations, signature = point.orbit.equations, point.orbit.signature
     if signature.symmetric:
         return End(OrbitEnd.GRAZES_INTO_REST, point.parameter)
     touch = point.solution.unknowns[2 * slow]
-    lengths = np.diff(np.append(point.solution.unknowns[::2], point.solution.unknowns[0] + problem.closing))
+    lengths = np.diff(np.append(point.solution.unknowns[::2], point.solution.unknowns[0] + equations.closing))
     side = signature.along()[int(np.argmax(lengths))]
     phase_zero = 2.0 * np.pi * np.ceil(touch / (2.0 * np.pi))
-    contact = np.array([float(problem.at(point.solution.values).model.contact), 0.0])
+    contact = np.array([float(equations.at(point.solution.values).model.contact), 0.0])
     for periods in range(1, signature.period + 1):  # families of several periods may meet here: take the shortest period
-        other = problem.with_signature(Signature((), periods, False, side))
+        other = equations.with_signature(Signature((), periods, False, side))
         state = other.carried(contact, touch, phase_zero, point.solution.values)
         later = other.carried(contact, touch, phase_zero + other.closing, point.solution.values)
         if state is not None and later is not None and np.abs(later - state).max() < TOLERANCES.touching_state:

@@ -9,11 +9,21 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from saltus.continuation import Continuation, Cut, End, Events, Missed, Zero, located
-from saltus.orbits.bifurcations import FLIP, GRAZING, Test, branch_tests, complex_pair, grazing, never_torus
-from saltus.orbits.contact_problem import ContactProblem
-from saltus.orbits.followed_problem import FollowedProblem
-from saltus.orbits.grazing import other_side
-from saltus.orbits.images import (
+from saltus.orbits.branches.beyond_events import (
+    TINY,
+    beyond,
+    change_at,
+    events_at,
+    first_step,
+    jump_over,
+    refused_beyond,
+    same_events,
+    stalled_at,
+)
+from saltus.orbits.branches.beyond_grazing import other_side
+from saltus.orbits.branches.beyond_switching import contact_change
+from saltus.orbits.branches.bifurcations import FLIP, GRAZING, Test, branch_tests, complex_pair, grazing, never_torus
+from saltus.orbits.branches.images import (
     beside_image,
     falls_onto_image,
     halves,
@@ -25,20 +35,10 @@ from saltus.orbits.images import (
     repetition,
     with_section_of,
 )
-from saltus.orbits.orbit_curve import OrbitPoint
-from saltus.orbits.special_point import OrbitEnd, OrbitMissed, SpecialKind, SpecialPoint, UserFunction
-from saltus.orbits.switching_contacts import contact_change
-from saltus.orbits.switching_followed import (
-    TINY,
-    beyond,
-    change_at,
-    events_at,
-    first_step,
-    jump_over,
-    refused_beyond,
-    same_events,
-    stalled_at,
-)
+from saltus.orbits.branches.orbit_curve import OrbitPoint
+from saltus.orbits.branches.special_point import OrbitEnd, OrbitMissed, SpecialKind, SpecialPoint, UserFunction
+from saltus.orbits.equations.contacts import ContactsEquations
+from saltus.orbits.equations.whole_motion import WholeMotionEquations
 from saltus.orbits.symmetry import full_point
 from saltus.orbits.tolerances import TOLERANCES
 
@@ -109,7 +109,7 @@ class BranchEvents(OrbitEvents):
         begins at one grazing and has gone past the next one."""
         begun = point.iterations == 0  # the first point beyond a grazing: its unknowns are known without solving
         skipped = begun and grazing(point) <= TOLERANCES.touch and grazing(ahead) < 0.0
-        if isinstance(point.orbit.problem, FollowedProblem):
+        if isinstance(point.orbit.equations, WholeMotionEquations):
             if abs(ahead.orbit.multipliers[0]) > SETTINGS.steepest:
                 return False  # multipliers grow without bound towards some changes of events: further steps would be rounding
             if isinstance(self.cut(point, ahead), End):
@@ -118,7 +118,7 @@ class BranchEvents(OrbitEvents):
 
     def barrier(self, point: OrbitPoint) -> Test:
         """The test function of grazings or, for orbits that are followed through their events, of changes of these events."""
-        return same_events(point) if isinstance(point.orbit.problem, FollowedProblem) else GRAZING
+        return same_events(point) if isinstance(point.orbit.equations, WholeMotionEquations) else GRAZING
 
     def cut(self, point: OrbitPoint, ahead: OrbitPoint) -> Cut | End | None:
         """Where a step is cut: at a grazing, or where a release or a closing of one of several contacts appears or is lost."""
@@ -130,9 +130,9 @@ class BranchEvents(OrbitEvents):
         found = super().cut(point, ahead)
         if not isinstance(found, Cut) or found.special is None:
             return found
-        if isinstance(found.point.orbit.problem, FollowedProblem):
+        if isinstance(found.point.orbit.equations, WholeMotionEquations):
             return change_at(found.special, point)
-        if isinstance(found.point.orbit.problem, ContactProblem):
+        if isinstance(found.point.orbit.equations, ContactsEquations):
             point = full_point(found.point) if found.point.orbit.symmetric else found.point
             return Cut(found.point, replace(found.special, kind=contact_change(point)))
         return found
@@ -194,7 +194,7 @@ class BranchEvents(OrbitEvents):
         if graze is not None and any(_same_place(graze, earlier) for earlier in run.special[:-1]):
             run.special.pop()
             return End(OrbitEnd.COMES_BACK, graze.parameter)
-        followed = isinstance(cut.point.orbit.problem, FollowedProblem)
+        followed = isinstance(cut.point.orbit.equations, WholeMotionEquations)
         if followed and (parent := _parent_at(run, cut)) is not None:
             run.special.append(parent)
             return End(OrbitEnd.IMAGE, parent.parameter, parent.kind)
@@ -211,19 +211,19 @@ class BranchEvents(OrbitEvents):
         return End(OrbitEnd.ACCUMULATES, value, detail=str(count)) if _accumulate(run, following) else following
 
     def first_step(self, points: Sequence[OrbitPoint]) -> float:
-        return first_step(*points[-2:]) if isinstance(points[-1].orbit.problem, FollowedProblem) else math.inf
+        return first_step(*points[-2:]) if isinstance(points[-1].orbit.equations, WholeMotionEquations) else math.inf
 
     def stalled(self, run: Run, point: OrbitPoint, step: float) -> Cut | End:
         """The end where even the shortest step fails: because the orbit repels too strongly, or for a reason that is not known.
 
         An orbit that is followed through its events may stall where these change; there the branch may turn round: a cut.
         """
-        if isinstance(point.orbit.problem, FollowedProblem):
+        if isinstance(point.orbit.equations, WholeMotionEquations):
             if (end := refused_beyond(point, step, run.bounds)) is not None:
                 return end
             if (cut := stalled_at(point, step, run.points)) is not None:
                 return cut
-        if point.orbit.problem.system.model.held and (limit := point.orbit.motion().limit) is not None:
+        if point.orbit.equations.system.model.held and (limit := point.orbit.motion().limit) is not None:
             return End(OrbitEnd.REFUSED, point.parameter, detail=limit)
         largest = abs(point.orbit.multipliers[0])
         if largest > SETTINGS.steepest and not point.orbit.grazes:
@@ -247,7 +247,9 @@ def _parent_at(run: Run, cut: Cut) -> SpecialPoint | None:
 def _impact_count(point: OrbitPoint) -> int:
     """The number of impacts in one period, without those of accumulations."""
     return (
-        events_at(point).impact_count if isinstance(point.curve.problem, FollowedProblem) else point.orbit.signature.impact_count
+        events_at(point).impact_count
+        if isinstance(point.curve.equations, WholeMotionEquations)
+        else point.orbit.signature.impact_count
     )
 
 
@@ -279,18 +281,18 @@ def parent_point(a: OrbitPoint, b: OrbitPoint) -> Zero | None:
     The orbit there is its own image. The family's equations are singular at it; those of the parent, over half of the period, are
     not.
     """
-    problem, first, last = a.curve.problem.halved, halves(a), halves(b)
+    equations, first, last = a.curve.equations.halved, halves(a), halves(b)
     assert first is not None
     assert last is not None
     lengths = [float(np.linalg.norm(both[1] - both[0])) for both in (first, last)]
     share = lengths[0] / sum(lengths)
     between = (first + share * (last - first)).mean(axis=0)
-    curve = a.curve.with_problem(problem)
+    curve = a.curve.with_equations(equations)
     guess = np.append(between, a.parameter + share * (b.parameter - a.parameter))
-    middle = curve.solve_at(guess, np.append(np.zeros(curve.problem.size), 1.0))
+    middle = curve.solve_at(guess, np.append(np.zeros(curve.equations.size), 1.0))
     if middle is None:
         return None
-    test, least = FLIP[problem.signature.symmetric], 0.0
+    test, least = FLIP[equations.signature.symmetric], 0.0
     for reach in (reach for reach in SETTINGS.reaches if reach > least):
         ends = [middle.beside(sign * reach) for sign in (-1.0, 1.0)]
         if ends[0] is None or ends[1] is None:

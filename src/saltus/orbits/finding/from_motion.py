@@ -20,11 +20,11 @@ from saltus.flow import (
     return_period,
     simulate,
 )
-from saltus.orbits.contact_problem import ContactProblem, problem_of
-from saltus.orbits.contact_signature import solved_from
+from saltus.orbits.equations.contacts import ContactsEquations, equations_of
+from saltus.orbits.equations.one_contact import OneContactEquations
+from saltus.orbits.equations.resting import resting_near
+from saltus.orbits.finding.contact_signature import solved_from
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.problem import Problem
-from saltus.orbits.resting import resting_near
 from saltus.orbits.signature import Signature
 from saltus.orbits.symmetry import half, is_symmetric, keeps_symmetry
 from saltus.orbits.tolerances import TOLERANCES
@@ -89,7 +89,7 @@ def find_orbit(
     2
     """
     _check(system, parameters, coordinates, {"period": period, "max_period": max_period, "settle": settle})
-    base = problem_of(system, Signature((), 1), tuple(parameters))  # refuses systems that have no orbits
+    base = equations_of(system, Signature((), 1), tuple(parameters))  # refuses systems that have no orbits
     state = {**coordinates, "velocity": velocity}
     if settle is not None:
         state = _after(system, state, settle)
@@ -189,7 +189,7 @@ def _period_of(system: System, state: dict[str, Any], period: int | None, max_pe
     return nearest_return(_stroboscopic_states(system, state, max_period)[::-1], max_period)
 
 
-def _polish(base: Problem, state: dict[str, Any], periods: int, passed: int | None) -> PeriodicOrbit:
+def _polish(base: OneContactEquations, state: dict[str, Any], periods: int, passed: int | None) -> PeriodicOrbit:
     """Solve for the orbit near a motion over one of its periods."""
     orbit = orbit_from(base, state, periods)
     if orbit is not None and orbit.admissible:
@@ -201,7 +201,7 @@ def _polish(base: Problem, state: dict[str, Any], periods: int, passed: int | No
     )
 
 
-def orbit_from(base: Problem, state: dict[str, Any], periods: int) -> PeriodicOrbit | None:
+def orbit_from(base: OneContactEquations, state: dict[str, Any], periods: int) -> PeriodicOrbit | None:
     """The orbit near a motion over `periods` forcing periods from a state at phase 0; it may be one that rests for a part of
     them."""
     orbit = orbit_near(base, state, periods)
@@ -210,21 +210,21 @@ def orbit_from(base: Problem, state: dict[str, Any], periods: int) -> PeriodicOr
     return resting_near(base, simulate(base.system, **state, periods=periods, dense=False), periods) or orbit
 
 
-def orbit_near(base: Problem, state: dict[str, Any], periods: int) -> PeriodicOrbit | None:
+def orbit_near(base: OneContactEquations, state: dict[str, Any], periods: int) -> PeriodicOrbit | None:
     """The orbit with the signature of a motion over `periods` forcing periods from a state at phase 0, by Newton's method."""
     system = base.system
-    if isinstance(base, ContactProblem):
+    if isinstance(base, ContactsEquations):
         solved = solved_from(base, state, periods, SETTINGS.iterations)
-        return None if solved is None else (half(solved) if _is_symmetric(solved.problem) else None) or solved
+        return None if solved is None else (half(solved) if _is_symmetric(solved.equations) else None) or solved
     motion = simulate(system, **state, periods=periods)
     if motion.side == 0 or len(motion.events.of(EventKind.REST)) or not motion.phase_known:
         return None
-    problem, unknowns = guess(base, motion, _vector(system, state), periods)
-    found = PeriodicOrbit.near(problem, unknowns, problem.values, iterations=SETTINGS.iterations)
+    equations, unknowns = guess(base, motion, _vector(system, state), periods)
+    found = PeriodicOrbit.near(equations, unknowns, equations.values, iterations=SETTINGS.iterations)
     return None if found is None else simplest(found)
 
 
-def guess(base: Problem, motion: Motion, state: np.ndarray, periods: int) -> tuple[Problem, np.ndarray]:
+def guess(base: OneContactEquations, motion: Motion, state: np.ndarray, periods: int) -> tuple[OneContactEquations, np.ndarray]:
     """The problem with a motion's signature, and its unknowns along the motion."""
     if base.passes_contact:
         return base.with_signature(Signature((), periods)), state
@@ -242,12 +242,12 @@ def guess(base: Problem, motion: Motion, state: np.ndarray, periods: int) -> tup
 def simplest(orbit: PeriodicOrbit) -> PeriodicOrbit:
     """An orbit as a solution over its least period or, where it is its own mirror image, over half of that."""
     orbit = divide(orbit) or orbit
-    return (half(orbit) if _is_symmetric(orbit.problem) else None) or orbit
+    return (half(orbit) if _is_symmetric(orbit.equations) else None) or orbit
 
 
-def _is_symmetric(problem: Problem) -> bool:
+def _is_symmetric(equations: OneContactEquations) -> bool:
     """Whether a system has the mirror symmetry, for all parameters at the problem's paths."""
-    return keeps_symmetry(problem.system, problem.paths[0]) if problem.paths else is_symmetric(problem.system)
+    return keeps_symmetry(equations.system, equations.paths[0]) if equations.paths else is_symmetric(equations.system)
 
 
 def divide(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
@@ -262,7 +262,7 @@ def divide(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
         if changes and (part == 0 or changes[:part] != changes[part : 2 * part]):
             continue
         short = replace(signature, sides=signature.sides[:part], events=signature.events[:part], period=q, symmetric=False)
-        shorter = orbit.problem.with_signature(short)
+        shorter = orbit.equations.with_signature(short)
         found = PeriodicOrbit.near(shorter, unknowns[: shorter.size], orbit.solution.values)
         if found is not None and np.abs(found.solution.unknowns - unknowns[: shorter.size]).max() < TOLERANCES.halves:
             return found

@@ -6,35 +6,35 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.orbits.equations.resting import RestingOrbit
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.resting import RestingOrbit
 from saltus.provenance import provenance
 
 if TYPE_CHECKING:
     import xarray
 
-    from saltus.orbits.branch import Branch
-    from saltus.orbits.special_point import SpecialPoint
+    from saltus.orbits.branches.branch import Branch
+    from saltus.orbits.branches.special_point import SpecialPoint
 
 
 def branch_dataset(branch: Branch) -> xarray.Dataset:
     """The dataset of a branch: points along `point`, special points along `special`.
 
-    `stable` and `symmetric` are 0 or 1; `unknowns` and `sides` are those of each orbit (see `problem.py`), padded with nan and
+    `stable` and `symmetric` are 0 or 1; `unknowns` and `sides` are those of each orbit (see `equations/`), padded with nan and
     0 to one length. Orbits that rest also have the times of their `releases` and `rests`. The attributes hold, for both ends, the
     sentence (`ends`), the reason as a word (`end_reasons`) and the kind of the special point there, if any (`end_kinds`).
     """
     import xarray
 
     orbits = branch.orbits
-    problem = orbits[0].problem
+    equations = orbits[0].equations
     data: dict[str, Any] = {"parameter": ("point", branch.parameters, {"long_name": branch.path})}
     data |= {name: ("point", values, attrs) for name, values, attrs in _columns(orbits)}
     data |= multiplier_columns(orbits) | solution_columns(orbits) | _special(branch.special) | _rests(orbits)
     attributes: dict[str, Any] = {
         "kind": "branch",
         "path": branch.path,
-        "coordinate": " ".join(problem.system.model.coordinates),
+        "coordinate": " ".join(equations.system.model.coordinates),
         "ends": [str(end) for end in branch.ends],
         "end_reasons": [end.reason.code for end in branch.ends],
         "end_kinds": [str(end.kind) for end in branch.ends],
@@ -42,12 +42,12 @@ def branch_dataset(branch: Branch) -> xarray.Dataset:
         "closed": int(branch.closed),
         "missed": "; ".join(map(str, branch.missed)),
     }
-    return xarray.Dataset(data, attrs=provenance(problem.system, tol=problem.tol, **attributes))
+    return xarray.Dataset(data, attrs=provenance(equations.system, tol=equations.tol, **attributes))
 
 
 def _columns(orbits: list[PeriodicOrbit]) -> list[tuple[str, np.ndarray, dict[str, str]]]:
     """The quantities that are one number for each orbit."""
-    model = orbits[0].problem.system.model
+    model = orbits[0].equations.system.model
     angle, coordinate = {"units": model.unit_of(model.coordinates[0])}, " or ".join(model.coordinates)
 
     def column(value: Any, kind: Any = float) -> np.ndarray:
@@ -64,7 +64,7 @@ def _columns(orbits: list[PeriodicOrbit]) -> list[tuple[str, np.ndarray, dict[st
         ("residual", column(lambda o: o.residual), {}),
         ("rest_share", column(lambda o: o.rest_share if isinstance(o, RestingOrbit) else 0.0), {}),
     ]
-    for name in orbits[0].problem.margins:
+    for name in orbits[0].equations.margins:
         attrs = {"long_name": f"least {name}", "margin_kind": str(model.margin_kind(name))}
         columns.append((f"margin_{name}", column(lambda o, name=name: o.margins[name]), attrs))
     return columns
@@ -91,11 +91,11 @@ def multiplier_columns(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
 
 def solution_columns(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
     """The signature of each orbit and the unknowns of its equations, in rows of one length, as `orbits_of` reads them."""
-    width = max(orbit.problem.size for orbit in orbits)
+    width = max(orbit.equations.size for orbit in orbits)
     unknowns = np.full((len(orbits), width), np.nan)
     sides = np.zeros((len(orbits), max(1, max(len(orbit.signature.sides) for orbit in orbits))), dtype=np.int8)
     for row, side, orbit in zip(unknowns, sides, orbits, strict=True):
-        row[: orbit.problem.size] = orbit.solution.unknowns
+        row[: orbit.equations.size] = orbit.solution.unknowns
         side[: len(orbit.signature.sides)] = orbit.signature.sides
     data: dict[str, Any] = {
         "unknowns": (("point", "unknown"), unknowns),
@@ -112,7 +112,7 @@ def solution_columns(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
             {"long_name": "side of an orbit without impacts"},
         ),
     }
-    if not orbits[0].problem.system.model.held:
+    if not orbits[0].equations.system.model.held:
         return data
     events = np.full((len(orbits), max(1, max(len(orbit.signature.events) for orbit in orbits)), 3), -1)
     for table, orbit in zip(events, orbits, strict=True):

@@ -9,17 +9,17 @@ from typing import Any
 from saltus.checks import check_along, check_bounds, check_path, check_step
 from saltus.continuation import STEPS, Continuation, End, Watch, both_ways
 from saltus.errors import ParameterError, shown
-from saltus.orbits.branch import START, Branch
-from saltus.orbits.branch_events import BranchEvents
-from saltus.orbits.contact_problem import problem_of
-from saltus.orbits.find import orbit_near
+from saltus.orbits.branches.branch import START, Branch
+from saltus.orbits.branches.branch_events import BranchEvents
+from saltus.orbits.branches.orbit_curve import OrbitPoint, start
+from saltus.orbits.branches.resting_family import RestingEvents, first_point, resting_steps
+from saltus.orbits.branches.special_point import SpecialKind, UserFunction
+from saltus.orbits.equations.contacts import equations_of
+from saltus.orbits.equations.one_contact import OneContactEquations
+from saltus.orbits.equations.resting import RestingOrbit
+from saltus.orbits.finding.from_motion import orbit_near
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.orbit_curve import OrbitPoint, start
-from saltus.orbits.problem import Problem
-from saltus.orbits.resting import RestingOrbit
-from saltus.orbits.resting_family import RestingEvents, first_point, resting_steps
 from saltus.orbits.signature import Signature
-from saltus.orbits.special_point import SpecialKind, UserFunction
 from saltus.orbits.symmetry import full_period, half, keeps_symmetry
 from saltus.progress import Progress, silent
 
@@ -113,7 +113,7 @@ def follow_from(
     progress: Progress = silent,
 ) -> Branch:
     """The branch that begins at a special point of another one, in the direction of its tangent."""
-    path, steps = first.orbit.problem.paths[0], replace(STEPS, longest=step)
+    path, steps = first.orbit.equations.paths[0], replace(STEPS, longest=step)
     within = {path: bounds}
     run = Continuation(within, BranchEvents(functions or {}, until), steps, Watch(progress, within, steps.most_points))
     run.follow(first, born=True)
@@ -138,11 +138,11 @@ def along(orbit: PeriodicOrbit, path: str) -> tuple[PeriodicOrbit, bool]:
     """
     system, signature = orbit.system, orbit.signature
     symmetric = keeps_symmetry(system, path)
-    problem = problem_of(system, signature, (path,))
-    if problem_of(system, Signature((), 1), (path,)).passes_contact != orbit.problem.passes_contact:
+    equations = equations_of(system, signature, (path,))
+    if equations_of(system, Signature((), 1), (path,)).passes_contact != orbit.equations.passes_contact:
         found = _in_other_equations(orbit, path)
     else:
-        found = PeriodicOrbit.near(problem, orbit.solution.unknowns, problem.values)
+        found = PeriodicOrbit.near(equations, orbit.solution.unknowns, equations.values)
     if found is None:
         raise ParameterError(f"the orbit does not solve its own equations to be continued along {path}; find it again", "orbit")
     if found.symmetric and not symmetric:
@@ -156,4 +156,4 @@ def _in_other_equations(orbit: PeriodicOrbit, path: str) -> PeriodicOrbit | None
     """The orbit solved for again, if the parameter that is now varied decides whether its contact is a singularity."""
     position, velocity = orbit.state
     state = {orbit.system.model.coordinates[0]: position, "velocity": velocity}
-    return orbit_near(Problem(orbit.system, Signature((), 1), (path,)), state, orbit.period)
+    return orbit_near(OneContactEquations(orbit.system, Signature((), 1), (path,)), state, orbit.period)

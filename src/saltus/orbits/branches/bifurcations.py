@@ -12,9 +12,9 @@ import numpy as np
 from saltus.bounds import area_contraction
 from saltus.continuation import TestFunction
 from saltus.flow import SegmentColumn
+from saltus.orbits.branches.orbit_curve import OrbitPoint
+from saltus.orbits.branches.special_point import SpecialKind, UserFunction
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.orbit_curve import OrbitPoint
-from saltus.orbits.special_point import SpecialKind, UserFunction
 
 Test = TestFunction
 
@@ -27,13 +27,13 @@ def fold(point: OrbitPoint) -> float:
 @lru_cache(maxsize=4)  # a point ends one step and begins the next
 def flip(point: OrbitPoint) -> float:
     """The determinant of the equations for perturbations that change their sign each (half) period."""
-    return scaled_determinant(point.equations.jacobian(-1.0))
+    return scaled_determinant(point.evaluation.jacobian(-1.0))
 
 
 @lru_cache(maxsize=4)
 def crossing(point: OrbitPoint) -> float:
     """The determinant of the equations with the tangent below them: it changes its sign where two branches cross."""
-    return scaled_determinant(np.vstack([point.equations.derivatives(), point.tangent * point.curve.weights**2]))
+    return scaled_determinant(np.vstack([point.evaluation.derivatives(), point.tangent * point.curve.weights**2]))
 
 
 def scaled_determinant(matrix: np.ndarray) -> float:
@@ -50,12 +50,12 @@ def torus(point: OrbitPoint) -> float:
     and it is -1. For two multipliers a b comes from the determinants of the segments' maps: their product keeps its digits
     where one multiplier is large.
     """
-    values, equations = point.orbit.multipliers, point.equations
+    values, evaluation = point.orbit.multipliers, point.evaluation
     if point.orbit.grazes:
         return -1.0
     with np.errstate(all="ignore"):
         if len(values) == 2:
-            half = float(np.prod(_areas(equations.here) / _areas(equations.there)))
+            half = float(np.prod(_areas(evaluation.here) / _areas(evaluation.there)))
             product = (half**2 if point.orbit.symmetric else half) - 1.0
         else:
             values = np.where(np.abs(values) > MULTIPLIER_ROUNDING * np.abs(values).max(), values, 0.0)
@@ -92,13 +92,13 @@ def grazing(point: OrbitPoint) -> float:
     Where the contact is no singularity, orbits exist on both sides of a grazing and a branch need not stop there: inf.
     """
     orbit = point.orbit
-    return math.inf if orbit.problem.passes_contact else min(orbit.slowest, orbit.clearance, orbit.pressing)
+    return math.inf if orbit.equations.passes_contact else min(orbit.slowest, orbit.clearance, orbit.pressing)
 
 
 def touching(point: OrbitPoint) -> float:
     """How far an orbit is from touching a contact that is no singularity; the sign changes with each additional pair of passages
     through the contact."""
-    orbit, extremes = point.orbit, point.equations.extremes
+    orbit, extremes = point.orbit, point.evaluation.extremes
     pairs = int(extremes[:, SegmentColumn.CROSSINGS].sum()) // 2
     return float((-1) ** pairs * min(NEAREST, orbit.clearance, orbit.shallowest))
 
@@ -121,7 +121,7 @@ GRAZING = Test(SpecialKind.GR, grazing, 1e-15)  # narrower than others: beside a
 def branch_tests(point: OrbitPoint, functions: dict[str, UserFunction]) -> Iterator[Test]:
     """All test functions of a branch at a point, but that of grazings at a contact that is a singularity (`GRAZING`)."""
     yield from (FOLD, FLIP[point.orbit.symmetric], CROSSING, TORUS)
-    if point.orbit.problem.passes_contact:
+    if point.orbit.equations.passes_contact:
         yield TOUCHING
     yield from orbit_tests(point.orbit, functions)
 
@@ -135,7 +135,7 @@ def orbit_tests(orbit: PeriodicOrbit, functions: dict[str, UserFunction]) -> Ite
     def value(function: UserFunction) -> Callable[[Any], float]:
         return lambda point: float(function(point.orbit))
 
-    for name in orbit.problem.margins:
+    for name in orbit.equations.margins:
         yield Test(name, margin(name))
     for name, function in functions.items():
         yield Test(name, value(function))

@@ -11,10 +11,10 @@ import math
 import numpy as np
 
 from saltus.continuation import between
-from saltus.orbits.contact_problem import ContactProblem
-from saltus.orbits.followed_problem import FollowedProblem
-from saltus.orbits.orbit_curve import OrbitPoint
-from saltus.orbits.problem import Problem
+from saltus.orbits.branches.orbit_curve import OrbitPoint
+from saltus.orbits.equations.contacts import ContactsEquations
+from saltus.orbits.equations.one_contact import OneContactEquations
+from saltus.orbits.equations.whole_motion import WholeMotionEquations
 from saltus.orbits.tolerances import TOLERANCES
 
 NEAR_THE_END = (0.99, 0.95, 0.9)  # Shares of the last step: at the end itself the equations are singular.
@@ -32,13 +32,13 @@ def asymmetry(point: OrbitPoint) -> np.ndarray | None:
 def halves(point: OrbitPoint) -> np.ndarray | None:
     """The unknowns of both halves of a period, each as unknowns of the equations over one half, (2, n); None as for
     `asymmetry`."""
-    signature, problem, unknowns = point.orbit.signature, point.orbit.problem, point.solution.unknowns
+    signature, equations, unknowns = point.orbit.signature, point.orbit.equations, point.solution.unknowns
     n, odd = len(signature.sides), signature.period % 2
     if signature.symmetric or n % 2:
         return None
     if signature.events:
-        assert isinstance(problem, ContactProblem)
-        return None if odd and not point.curve.symmetric else problem.halves(unknowns, point.equations)
+        assert isinstance(equations, ContactsEquations)
+        return None if odd and not point.curve.symmetric else equations.halves(unknowns, point.evaluation)
     if n == 0:
         return None if point.half_way is None else np.stack([unknowns, unknowns + point.half_way])
     first, second = signature.sides[: n // 2], signature.sides[n // 2 :]
@@ -64,8 +64,8 @@ def on_family(point: OrbitPoint, parent: OrbitPoint) -> OrbitPoint | None:
     assert difference is not None
     unknowns, tangent = parent.solution.unknowns, difference
     if signature.sides or signature.events:
-        unknowns = parent.orbit.problem.repeated(unknowns)
-        tangent = parent.orbit.problem.alternating(difference)
+        unknowns = parent.orbit.equations.repeated(unknowns)
+        tangent = parent.orbit.equations.alternating(difference)
     found = point.curve.known(unknowns, parent.solution.values)
     if found is None:
         return None
@@ -107,11 +107,11 @@ def is_image(point: OrbitPoint, within: float = 1e-2 * TOLERANCES.image) -> bool
 def parent_of(point: OrbitPoint, within: float = TOLERANCES.grazing_orbits) -> OrbitPoint | None:
     """The orbit of the parent, over half of the period, of an orbit that is its own image up to `within`; None for other
     orbits."""
-    problem = point.curve.problem.halved
-    if problem is None or not is_image(point, within):
+    equations = point.curve.equations.halved
+    if equations is None or not is_image(point, within):
         return None
-    curve = point.curve.with_problem(problem)
-    parent: OrbitPoint | None = curve.solve_at(point.place, np.append(np.zeros(problem.size), 1.0))
+    curve = point.curve.with_equations(equations)
+    parent: OrbitPoint | None = curve.solve_at(point.place, np.append(np.zeros(equations.size), 1.0))
     return parent
 
 
@@ -132,11 +132,11 @@ def repetition(point: OrbitPoint) -> str | None:
     return None
 
 
-def renumbered(problem: Problem, unknowns: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
+def renumbered(equations: OneContactEquations, unknowns: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
     """The unknowns of an orbit, begun at another impact and shifted by whole forcing periods such that they are nearest to those
     of the point `other`; None where the signatures differ.
     """
-    target, signature = other.orbit.signature, problem.signature
+    target, signature = other.orbit.signature, equations.signature
     n = len(signature.sides)
     if (n, signature.period, signature.symmetric) != (len(target.sides), target.period, target.symmetric):
         return None
@@ -144,7 +144,7 @@ def renumbered(problem: Problem, unknowns: np.ndarray, other: OrbitPoint) -> np.
         return unknowns if signature == target else None
     pairs, best, least = unknowns.reshape(n, 2), None, math.inf
     goal = other.solution.unknowns.reshape(n, 2)
-    once = [np.array([turn * problem.closing, 0.0]) for turn in range(3)]
+    once = [np.array([turn * equations.closing, 0.0]) for turn in range(3)]
     later = np.concatenate([pairs + shift for shift in once])  # the impacts of three (half) periods
     next_sides = tuple(-side for side in signature.sides) if signature.symmetric else signature.sides
     sides = signature.sides + next_sides + signature.sides
@@ -162,27 +162,27 @@ def renumbered(problem: Problem, unknowns: np.ndarray, other: OrbitPoint) -> np.
 def nearest(point: OrbitPoint, place: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
     """A place on the curve of `point`, in the unknowns that are nearest to those of `other`: begun at another impact, or given at
     the section of `other`. None if the orbits cannot be compared so."""
-    problem, n = point.curve.problem, point.curve.problem.size
-    if isinstance(problem, FollowedProblem):
-        unknowns = _at_section_of(problem, place, other)
+    equations, n = point.curve.equations, point.curve.equations.size
+    if isinstance(equations, WholeMotionEquations):
+        unknowns = _at_section_of(equations, place, other)
     else:
-        unknowns = renumbered(problem, place[:n], other)
+        unknowns = renumbered(equations, place[:n], other)
     return None if unknowns is None else np.concatenate([unknowns, place[n:]])
 
 
-def _at_section_of(problem: FollowedProblem, place: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
+def _at_section_of(equations: WholeMotionEquations, place: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
     """The state of an orbit at the section of the point `other`, in the forcing period in which it is nearest to that of `other`;
     None where `other` has no section, or another period or symmetry."""
-    target, n = other.orbit.signature, problem.size
-    if target.section is None or (target.period, target.symmetric) != (problem.signature.period, problem.signature.symmetric):
+    target, n = other.orbit.signature, equations.size
+    if target.section is None or (target.period, target.symmetric) != (equations.signature.period, equations.signature.symmetric):
         return None
-    return problem.state_at(target.section, place[:n], place[n:], other.solution.unknowns)
+    return equations.state_at(target.section, place[:n], place[n:], other.solution.unknowns)
 
 
 def with_section_of(point: OrbitPoint, other: OrbitPoint) -> OrbitPoint:
     """A point whose orbit is followed through its events, given at the section of another point; other points are unchanged."""
     place = None
-    if isinstance(point.curve.problem, FollowedProblem) and not point.curve.joins(other.curve):
+    if isinstance(point.curve.equations, WholeMotionEquations) and not point.curve.joins(other.curve):
         place = nearest(point, point.place, other)
-    found = None if place is None else other.curve.known(*np.split(place, [other.curve.problem.size]))
+    found = None if place is None else other.curve.known(*np.split(place, [other.curve.equations.size]))
     return point if found is None else other.curve.with_tangent(found, other.tangent) or point

@@ -42,7 +42,7 @@ ORBIT_TOLERANCE = 1e-14  # of the segments' steps: the orbits are then exact to 
 
 
 @dataclass(frozen=True)
-class Equations:
+class OrbitEvaluation:
     """The problem at one point: the residual and its derivatives, one block for each segment, and extremes along the segments.
 
     Block row i of the Jacobian has `here[i]` in the columns of the unknowns of segment i, and `there[i]` in those of the next
@@ -115,7 +115,7 @@ class FollowedSegments(NamedTuple):
     rates: np.ndarray  # the sign of the gap's derivative to the coordinate, on each side
 
 
-class Problem:
+class OneContactEquations:
     """The equations of one signature of a system, as functions of the unknowns and of the parameters at `paths`."""
 
     stray: float = math.inf  # see `EquationCurve`
@@ -193,7 +193,7 @@ class Problem:
         """
         return self.system.with_({path: float(value) for path, value in zip(self.paths, values, strict=True)})
 
-    def with_signature(self, signature: Signature) -> Problem:
+    def with_signature(self, signature: Signature) -> OneContactEquations:
         """The problem of another signature."""
         return type(self)(self.system, signature, self.paths, self.tol)
 
@@ -203,7 +203,7 @@ class Problem:
         return contact_images(self.system.model, self.system.impact) or ()
 
     @cached_property
-    def halved(self) -> Problem:
+    def halved(self) -> OneContactEquations:
         """The problem of the orbits that are their own images, over half a period: symmetric orbits if the period is odd, else
         orbits of half the period."""
         own, odd = self.signature, bool(self.signature.period % 2)
@@ -211,20 +211,20 @@ class Problem:
         sides, events = own.sides[: len(own.sides) // 2], own.events[: len(own.events) // 2]
         return self.with_signature(replace(own, sides=sides, events=events, period=period, symmetric=odd))
 
-    def impacts(self, unknowns: np.ndarray, equations: Equations) -> tuple[np.ndarray, np.ndarray]:
+    def impacts(self, unknowns: np.ndarray, evaluation: OrbitEvaluation) -> tuple[np.ndarray, np.ndarray]:
         """The phases of the impacts, and the speeds at which the gap closes before them."""
         return (unknowns[::2], unknowns[1::2]) if self.signature.sides else (np.empty(0), np.empty(0))
 
-    def touching_speed(self, unknowns: np.ndarray, equations: Equations) -> float:
+    def touching_speed(self, unknowns: np.ndarray, evaluation: OrbitEvaluation) -> float:
         """The least speed of the impacts at which the map loses its derivative if the speed vanishes; inf without such
         impacts."""
-        return float(self.impacts(unknowns, equations)[1].min(initial=math.inf))
+        return float(self.impacts(unknowns, evaluation)[1].min(initial=math.inf))
 
-    def pressing(self, unknowns: np.ndarray, equations: Equations) -> float:
+    def pressing(self, unknowns: np.ndarray, evaluation: OrbitEvaluation) -> float:
         """A quantity that is negative if a contact that the equations take for closed would open; inf without closed contacts."""
         return math.inf
 
-    def half_way(self, unknowns: np.ndarray, values: np.ndarray, equations: Equations) -> np.ndarray | None:
+    def half_way(self, unknowns: np.ndarray, values: np.ndarray, evaluation: OrbitEvaluation) -> np.ndarray | None:
         """For an orbit without impacts, the difference of its image from itself; None where the motion cannot be followed."""
         found = self.halved.evaluate(unknowns, values)
         return None if found is None else found.residual
@@ -242,7 +242,7 @@ class Problem:
 
     def evaluate(
         self, unknowns: np.ndarray, values: np.ndarray, with_extremes: bool = False, *, later: np.ndarray | None = None
-    ) -> Equations | None:
+    ) -> OrbitEvaluation | None:
         """The equations at a point, or None where the motion cannot be followed.
 
         `later` are the unknowns asked for at the end of the period, if they differ from those at its beginning.
@@ -306,7 +306,7 @@ class Problem:
         """The side of each segment; 0 stands for all sides, where the contact is passed through."""
         return (0,) if self.passes_contact else self.signature.along()
 
-    def _shooting(self, later: np.ndarray, frequency: float, followed: FollowedSegments) -> Equations:
+    def _shooting(self, later: np.ndarray, frequency: float, followed: FollowedSegments) -> OrbitEvaluation:
         own, sign = self.own, -1.0 if self.signature.symmetric else 1.0
         ends, columns, extremes, _ = followed
         state = ends[0, SegmentValue.FIRST_STATE : SegmentValue.FIRST_STATE + 2 * own]
@@ -315,9 +315,11 @@ class Problem:
         if FREQUENCY in self.paths:
             parameters[:, self.paths.index(FREQUENCY)] -= sign * rates * self.closing / frequency**2
         here, there = sign * columns[:, : 2 * own, : 2 * own], -np.eye(2 * own)[None]
-        return Equations(sign * state - later, here, there, parameters, ends, extremes)
+        return OrbitEvaluation(sign * state - later, here, there, parameters, ends, extremes)
 
-    def _crossing(self, following: np.ndarray, frequency: float, segments: Segments, followed: FollowedSegments) -> Equations:
+    def _crossing(
+        self, following: np.ndarray, frequency: float, segments: Segments, followed: FollowedSegments
+    ) -> OrbitEvaluation:
         """The equations of the impacts at the ends of the segments, at which the gap closes with the speeds `following`."""
         spans, (ends, columns, extremes, rates) = segments.spans, followed
         n, count = len(spans), len(self.paths)
@@ -326,7 +328,7 @@ class Problem:
         parameters = np.empty((n, 2, count))
         place = self.paths.index(FREQUENCY) if FREQUENCY in self.paths else -1
         load_segments()[1](spans, sign, following, frequency, place, ends, columns, residual, here, there, parameters)
-        return Equations(residual.ravel(), here, there, parameters.reshape(2 * n, count), ends, extremes)
+        return OrbitEvaluation(residual.ravel(), here, there, parameters.reshape(2 * n, count), ends, extremes)
 
 
 def _ready(system: System, paths: tuple[str, ...]) -> Any:

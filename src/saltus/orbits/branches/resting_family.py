@@ -29,11 +29,11 @@ from saltus.continuation import (
 )
 from saltus.errors import SaltusError
 from saltus.flow import Release, load_releases, peak_near
-from saltus.orbits.bifurcations import orbit_tests
-from saltus.orbits.problem import Problem
-from saltus.orbits.resting import RestingOrbit, resting_orbit
+from saltus.orbits.branches.bifurcations import orbit_tests
+from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint, UserFunction
+from saltus.orbits.equations.one_contact import OneContactEquations
+from saltus.orbits.equations.resting import RestingOrbit, resting_orbit
 from saltus.orbits.signature import Signature
-from saltus.orbits.special_point import OrbitEnd, SpecialKind, SpecialPoint, UserFunction
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ def _followed(orbit: RestingOrbit, path: str, value: float, index: int = 0) -> R
     nearest = min((release for release in load_releases(system) if release.side == side), key=apart, default=None)
     if nearest is None or apart(nearest) > SETTINGS.most_change:
         return None
-    found = resting_orbit(Problem(system, Signature((), 1), (path,)), nearest, orbit.period)
+    found = resting_orbit(OneContactEquations(system, Signature((), 1), (path,)), nearest, orbit.period)
     return found if found is not None and found.excursions[0, 0] == nearest.time else None
 
 

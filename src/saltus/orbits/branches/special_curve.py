@@ -9,13 +9,13 @@ import numpy as np
 
 from saltus.continuation import Corrected, Course
 from saltus.errors import ParameterError
-from saltus.orbits.branch_dataset import multiplier_columns, solution_columns
-from saltus.orbits.conditions import Condition, ConditionValue, Slow
-from saltus.orbits.newton import Solution
+from saltus.orbits.branches.branch_dataset import multiplier_columns, solution_columns
+from saltus.orbits.branches.conditions import Condition, ConditionValue, Slow
+from saltus.orbits.branches.orbit_curve import OrbitCurve, OrbitPoint
+from saltus.orbits.branches.special_point import SpecialPoint
+from saltus.orbits.equations.newton import Solution
+from saltus.orbits.equations.one_contact import OrbitEvaluation
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.orbit_curve import OrbitCurve, OrbitPoint
-from saltus.orbits.problem import Equations
-from saltus.orbits.special_point import SpecialPoint
 from saltus.provenance import provenance
 from saltus.public_functions import answering
 from saltus.result import Result
@@ -28,17 +28,17 @@ if TYPE_CHECKING:
 class Conditioned:
     """The equations of an orbit and the condition of its special point, evaluated at one place."""
 
-    equations: Equations
+    evaluation: OrbitEvaluation
     condition_value: ConditionValue
 
     @property
     def residual(self) -> np.ndarray:
         """The residual of the orbit's equations, and the condition's value."""
-        return np.append(self.equations.residual, self.condition_value.value)
+        return np.append(self.evaluation.residual, self.condition_value.value)
 
     def derivatives(self) -> np.ndarray:
         """The derivatives to the unknowns and the parameters."""
-        return np.vstack([self.equations.derivatives(), self.condition_value.gradient])
+        return np.vstack([self.evaluation.derivatives(), self.condition_value.gradient])
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,9 +76,9 @@ class ConditionedCurve(OrbitCurve):
 
     def evaluate(self, place: np.ndarray, thorough: bool) -> Conditioned | None:
         """The orbit's equations and the condition."""
-        n, equations = self.problem.size, super().evaluate(place, thorough)
-        value = None if equations is None else self.condition.evaluate(Solution(place[:n], place[n:], equations, 0))
-        return None if value is None else Conditioned(equations, value)
+        n, evaluation = self.equations.size, super().evaluate(place, thorough)
+        value = None if evaluation is None else self.condition.evaluate(Solution(place[:n], place[n:], evaluation, 0))
+        return None if value is None else Conditioned(evaluation, value)
 
     def solve(self, guess: np.ndarray, direction: np.ndarray) -> Any:
         """The point near a guess in the hyperplane through it normal to a direction, which may be of any length."""
@@ -87,7 +87,7 @@ class ConditionedCurve(OrbitCurve):
     def point_at(self, found: Corrected[Any], tangent: np.ndarray) -> SpecialCurvePoint:
         value = found.evaluation.condition_value
         curve = replace(self, condition=self.condition.moved(value))
-        return SpecialCurvePoint(curve, found.place, tangent, found.iterations, found.evaluation.equations, value)
+        return SpecialCurvePoint(curve, found.place, tangent, found.iterations, found.evaluation.evaluation, value)
 
     def joins(self, other: Any) -> bool:
         """Whether two points lie on one curve: always, as the condition is the same whatever vectors border it."""
@@ -106,7 +106,7 @@ class ConditionedCurve(OrbitCurve):
 def without_condition(point: SpecialCurvePoint) -> OrbitPoint:
     """A point as an orbit alone, on the surface of orbits along both parameters."""
     return OrbitPoint(
-        point.curve.with_problem(point.orbit.problem), point.place, point.tangent, point.iterations, point.equations
+        point.curve.with_equations(point.orbit.equations), point.place, point.tangent, point.iterations, point.evaluation
     )
 
 
@@ -174,8 +174,8 @@ class SpecialCurve(Result, Course[SpecialCurvePoint, SpecialPoint]):
         """
         import xarray
 
-        orbits, problem = self.orbits, self.orbits[0].problem
-        model = problem.system.model
+        orbits, equations = self.orbits, self.orbits[0].equations
+        model = equations.system.model
         name = model.coordinates[0]
         angle = {"units": model.unit_of(name), "long_name": f"max abs({name})"}
         data: dict[str, Any] = {
@@ -195,7 +195,7 @@ class SpecialCurve(Result, Course[SpecialCurvePoint, SpecialPoint]):
             "end_reasons": [end.reason.code for end in self.ends],
             "closed": int(self.closed),
         }
-        known = provenance(problem.system, tol=problem.tol, **attributes)
+        known = provenance(equations.system, tol=equations.tol, **attributes)
         return xarray.Dataset(data, coords={"path": list(self.paths)}, attrs=known)
 
     def __repr__(self) -> str:

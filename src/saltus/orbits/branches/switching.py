@@ -10,11 +10,11 @@ import numpy as np
 from saltus.checks import check_bounds, check_step
 from saltus.continuation import End
 from saltus.errors import ParameterError
-from saltus.orbits.branch import Branch
-from saltus.orbits.branch_continuation import STEP, follow_from
-from saltus.orbits.orbit_curve import OrbitPoint
-from saltus.orbits.problem import Problem
-from saltus.orbits.special_point import OrbitEnd, SpecialKind, SpecialPoint, UserFunction
+from saltus.orbits.branches.branch import Branch
+from saltus.orbits.branches.branch_continuation import STEP, follow_from
+from saltus.orbits.branches.orbit_curve import OrbitPoint
+from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint, UserFunction
+from saltus.orbits.equations.one_contact import OneContactEquations
 from saltus.orbits.symmetry import full_period
 from saltus.progress import Progress, silent
 from saltus.result import Result, result_dataset
@@ -91,29 +91,29 @@ def _kernel(matrix: np.ndarray) -> np.ndarray:
 
 def _doubled(point: OrbitPoint) -> OrbitPoint | None:
     """The orbit gone round twice, and the direction in which the two rounds differ."""
-    problem, signature = point.orbit.problem, point.orbit.signature
+    equations, signature = point.orbit.equations, point.orbit.signature
     if 2 * signature.period > MOST_DOUBLED:
         return None
     events, sides = 2 * signature.events, 2 * signature.sides
     twice = replace(signature, sides=sides, events=events, period=2 * signature.period, symmetric=False)
-    unknowns, direction = point.solution.unknowns, _kernel(point.equations.jacobian(-1.0))
+    unknowns, direction = point.solution.unknowns, _kernel(point.evaluation.jacobian(-1.0))
     if sides or events:
-        unknowns, direction = problem.repeated(unknowns), problem.alternating(direction)
-    return _along(point, problem.with_signature(twice), unknowns, direction)
+        unknowns, direction = equations.repeated(unknowns), equations.alternating(direction)
+    return _along(point, equations.with_signature(twice), unknowns, direction)
 
 
 def _unsymmetric(point: OrbitPoint) -> tuple[OrbitPoint | None, ...]:
     """The symmetric orbit over its full period, and the two directions in which its halves differ."""
     orbit = full_period(point.orbit)
-    direction = _kernel(point.equations.jacobian(-1.0))
+    direction = _kernel(point.evaluation.jacobian(-1.0))
     if point.orbit.signature.sides or point.orbit.signature.events:
-        direction = point.orbit.problem.alternating(direction)
-    return tuple(_along(point, orbit.problem, orbit.solution.unknowns, sign * direction) for sign in (1.0, -1.0))
+        direction = point.orbit.equations.alternating(direction)
+    return tuple(_along(point, orbit.equations, orbit.solution.unknowns, sign * direction) for sign in (1.0, -1.0))
 
 
-def _along(point: OrbitPoint, problem: Problem, unknowns: np.ndarray, direction: np.ndarray) -> OrbitPoint | None:
+def _along(point: OrbitPoint, equations: OneContactEquations, unknowns: np.ndarray, direction: np.ndarray) -> OrbitPoint | None:
     """The first point of the new branch, to be followed in a direction of the unknowns."""
-    curve, tangent = point.curve.with_problem(problem), np.append(direction, 0.0)
+    curve, tangent = point.curve.with_equations(equations), np.append(direction, 0.0)
     known = curve.known(unknowns, point.parameters)
     return None if known is None else curve.point_at(known, tangent / curve.norm(tangent))
 
@@ -123,7 +123,7 @@ def _crossing_branch(point: OrbitPoint) -> tuple[OrbitPoint | None, ...]:
     orthogonal to the branch's own."""
     curve = point.curve
     own = point.tangent * curve.weights
-    kernel = np.linalg.svd(point.equations.derivatives() / curve.weights)[2][-2:]
+    kernel = np.linalg.svd(point.evaluation.derivatives() / curve.weights)[2][-2:]
     other = kernel[int(np.argmin(np.abs(kernel @ own)))]
     other = other - (other @ own) * own
     tangent = other / curve.weights
@@ -166,7 +166,7 @@ class Cascade(Result):
 
     def to_xarray(self) -> xarray.Dataset:
         """`parameter`, `period` and `amplitude` of the doublings over `doubling`, and their `ratio` over `step`."""
-        orbit, path = self.points[0].orbit, self.points[0].orbit.problem.paths[0]
+        orbit, path = self.points[0].orbit, self.points[0].orbit.equations.paths[0]
         name = orbit.system.model.coordinates[0]
         amplitudes = [point.amplitude for point in self.points]
         columns: dict[str, tuple[Any, ...]] = {

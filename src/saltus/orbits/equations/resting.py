@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from saltus.flow import EventKind, Motion, Release, SegmentValue, load_releases, peak_near, simulate
-from saltus.orbits.newton import Solution
+from saltus.orbits.equations.newton import Solution
+from saltus.orbits.equations.one_contact import ORBIT_TOLERANCE, OneContactEquations, OrbitEvaluation, Segments
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.problem import ORBIT_TOLERANCE, Equations, Problem, Segments
 from saltus.orbits.signature import Signature
 from saltus.orbits.symmetry import is_symmetric, keeps_symmetry
 from saltus.orbits.tolerances import TOLERANCES
@@ -38,7 +38,7 @@ class RestingOrbit(PeriodicOrbit):
 
     Attributes
     ----------
-    problem
+    equations
         The equations that it solves.
     solution
         Their solution.
@@ -147,7 +147,7 @@ class RestingOrbit(PeriodicOrbit):
         )
 
 
-def resting_near(base: Problem, motion: Motion, max_period: int) -> RestingOrbit | None:
+def resting_near(base: OneContactEquations, motion: Motion, max_period: int) -> RestingOrbit | None:
     """The resting orbit of up to `max_period` forcing periods that a motion follows after its last release; None if there is
     none.
 
@@ -164,7 +164,7 @@ def resting_near(base: Problem, motion: Motion, max_period: int) -> RestingOrbit
     return found if release is None else resting_orbit(base, release, max_period)
 
 
-def resting_orbit(base: Problem, release: Release, max_period: int) -> RestingOrbit | None:
+def resting_orbit(base: OneContactEquations, release: Release, max_period: int) -> RestingOrbit | None:
     """The resting orbit of up to `max_period` forcing periods that the motion from a release leads to; None if there is none."""
     system, period = base.system, base.system.load.period
     assert period is not None
@@ -203,7 +203,7 @@ def _known(roots: tuple[Release, ...], time: float, side: int, system: System) -
     return nearest if nearest is not None and apart(nearest) < TOLERANCES.release * period else None
 
 
-def _orbit(base: Problem, chain: tuple[Release, ...], periods: int) -> RestingOrbit | None:
+def _orbit(base: OneContactEquations, chain: tuple[Release, ...], periods: int) -> RestingOrbit | None:
     """The orbit that goes through a cycle of releases; it is given by its first half if it is symmetric and the system stays
     so."""
     system, period = base.system, base.system.load.period
@@ -219,12 +219,12 @@ def _orbit(base: Problem, chain: tuple[Release, ...], periods: int) -> RestingOr
     if excursions is None:
         return None
     impacts = motion.impacts
-    problem = base.with_signature(Signature(tuple(int(s) for s in impacts.side), periods, symmetric))
-    equations, bends = _between(problem, motion, excursions)
-    if equations is None:
+    equations = base.with_signature(Signature(tuple(int(s) for s in impacts.side), periods, symmetric))
+    evaluation, bends = _between(equations, motion, excursions)
+    if evaluation is None:
         return None
     unknowns = np.stack([impacts.time * base.frequency(base.values), np.abs(impacts.velocity_before)], axis=1).ravel()
-    return RestingOrbit(problem, Solution(unknowns, problem.values, equations, 0), excursions, bends)
+    return RestingOrbit(equations, Solution(unknowns, equations.values, evaluation, 0), excursions, bends)
 
 
 def _excursions(motion: Motion, first: Release, end: float, slack: float) -> np.ndarray | None:
@@ -240,9 +240,9 @@ def _excursions(motion: Motion, first: Release, end: float, slack: float) -> np.
     return np.array([releases, rests, sides]).T
 
 
-def _between(problem: Problem, motion: Motion, excursions: np.ndarray) -> tuple[Equations | None, np.ndarray]:
+def _between(equations: OneContactEquations, motion: Motion, excursions: np.ndarray) -> tuple[OrbitEvaluation | None, np.ndarray]:
     """The equations of the impacts along the smooth segments between them, and the gap's second derivatives at the impacts."""
-    impacts, contact = motion.impacts, float(problem.system.model.contact)
+    impacts, contact = motion.impacts, float(equations.system.model.contact)
     speeds = np.abs(impacts.velocity_before)
     opened = np.searchsorted(impacts.time, excursions[:, RELEASED])  # the first impact of each excursion
     begins, before = np.append(-np.inf, impacts.time[:-1]), np.append(0, impacts.side[:-1]).astype(np.int64)
@@ -253,7 +253,7 @@ def _between(problem: Problem, motion: Motion, excursions: np.ndarray) -> tuple[
     spans = np.stack([begins, impacts.time, approach], axis=1)
     along = impacts.side.astype(np.int64)
     segments = Segments(spans, np.stack([before, along], axis=1), states)
-    followed = problem.follow_segments(segments, problem.values, with_extremes=True)
+    followed = equations.follow_segments(segments, equations.values, with_extremes=True)
     if followed is None:
         return None, np.empty(0)
     ends, _, extremes, rates = followed
@@ -262,6 +262,6 @@ def _between(problem: Problem, motion: Motion, excursions: np.ndarray) -> tuple[
         [ends[:, SegmentValue.FIRST_STATE] - contact, -sign * ends[:, SegmentValue.FIRST_STATE + 1] - speeds], axis=1
     )
     nothing = np.empty((0, 2, 2))
-    equations = Equations(closed.ravel(), nothing, nothing, np.empty((0, len(problem.paths))), ends, extremes)
+    evaluation = OrbitEvaluation(closed.ravel(), nothing, nothing, np.empty((0, len(equations.paths))), ends, extremes)
     bends: np.ndarray = sign * ends[:, SegmentValue.FIRST_STATE + 2]
-    return equations, bends
+    return evaluation, bends

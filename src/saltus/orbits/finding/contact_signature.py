@@ -10,9 +10,9 @@ import numpy as np
 
 from saltus.errors import MotionError
 from saltus.flow import EventKind, Motion, Stop, modes_of, simulate
-from saltus.orbits.contact_problem import ContactProblem, problem_of
+from saltus.orbits.equations.contacts import ContactsEquations, equations_of
+from saltus.orbits.equations.one_contact import OneContactEquations
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.problem import Problem
 from saltus.orbits.signature import ModeChange, Signature
 
 
@@ -27,7 +27,7 @@ class ReadingSettings:
 SETTINGS = ReadingSettings()
 
 
-def solved_from(base: Problem, state: dict[str, Any], periods: int, iterations: int) -> PeriodicOrbit | None:
+def solved_from(base: OneContactEquations, state: dict[str, Any], periods: int, iterations: int) -> PeriodicOrbit | None:
     """The orbit with the signature of a motion over `periods` forcing periods from a state, by Newton's method.
 
     Raises
@@ -39,20 +39,20 @@ def solved_from(base: Problem, state: dict[str, Any], periods: int, iterations: 
     if motion.limit is not None:
         return None
     followed = _is_followed(base, motion)
-    problem, unknowns = _followed(base, motion, periods) if followed else read_signature(base, motion, periods)
+    equations, unknowns = _followed(base, motion, periods) if followed else read_signature(base, motion, periods)
     later = motion.events and motion.events[-1].time > 0.5 * (motion.start + motion.time)
-    if not problem.size or (followed and motion.stop is Stop.REST and not later):
+    if not equations.size or (followed and motion.stop is Stop.REST and not later):
         raise MotionError("the motion comes to rest with all coordinates held at contacts for good, which is no orbit to follow")
-    return PeriodicOrbit.near(problem, unknowns, problem.values, iterations=iterations)
+    return PeriodicOrbit.near(equations, unknowns, equations.values, iterations=iterations)
 
 
-def _is_followed(base: Problem, motion: Motion) -> bool:
+def _is_followed(base: OneContactEquations, motion: Motion) -> bool:
     """Whether the orbit is followed through its events, because there are no equations from event to event for it: with
     frictions, or with accumulations of impacts."""
     return bool(base.system.model.frictions) or len(motion.events.of(EventKind.HELD)) > 0
 
 
-def _followed(base: Problem, motion: Motion, periods: int) -> tuple[Problem, np.ndarray]:
+def _followed(base: OneContactEquations, motion: Motion, periods: int) -> tuple[OneContactEquations, np.ndarray]:
     """The problem x = Phi(x) over `periods` forcing periods, with a section chosen along a motion, and the motion's state
     there."""
     period = base.system.load.period
@@ -61,7 +61,7 @@ def _followed(base: Problem, motion: Motion, periods: int) -> tuple[Problem, np.
     if not within.any() and 0 in motion.sliding.values():
         raise MotionError("the motion sticks for good, as it may anywhere near, which is no orbit to follow")
     phase, state = section_of(motion, base.frequency(base.values), duration=periods * period)
-    return problem_of(base.system, Signature((), periods, section=phase), base.paths, base.tol), state
+    return equations_of(base.system, Signature((), periods, section=phase), base.paths, base.tol), state
 
 
 def section_of(
@@ -87,7 +87,7 @@ def section_of(
     return time * frequency % (2.0 * np.pi), state
 
 
-def read_signature(base: Problem, motion: Motion, periods: int) -> tuple[ContactProblem, np.ndarray]:
+def read_signature(base: OneContactEquations, motion: Motion, periods: int) -> tuple[ContactsEquations, np.ndarray]:
     """The problem with the signature of a motion, and its unknowns along the motion, which was followed for twice `periods`.
 
     The events are those of a span of `periods` forcing periods that begins in the middle between two events.
@@ -103,16 +103,16 @@ def read_signature(base: Problem, motion: Motion, periods: int) -> tuple[Contact
     chosen = [(time, change) for time, change in changes if begin <= time < begin + length]
     events = tuple(change for _, change in chosen)
     signature = Signature((), periods, events=events, closed=0 if events else motion.side - 1)
-    problem = base.with_signature(signature)
-    assert isinstance(problem, ContactProblem)
+    equations = base.with_signature(signature)
+    assert isinstance(equations, ContactsEquations)
     first = chosen[0][0] if chosen else motion.start
     position, velocity = motion.at(first)
     after = np.append(np.atleast_1d(position), np.atleast_1d(velocity))
     phases = np.array([time for time, _ in chosen]) * base.frequency(base.values)
-    return problem, problem.joined(after, phases)
+    return equations, equations.joined(after, phases)
 
 
-def _mode_changes(base: Problem, motion: Motion, together: float) -> list[tuple[float, ModeChange]]:
+def _mode_changes(base: OneContactEquations, motion: Motion, together: float) -> list[tuple[float, ModeChange]]:
     """The events at which contacts open or close, each with its time and the contacts that are closed after it.
 
     Contacts of different groups, such as the cells of a chain that move alike, may act at one instant. These count as events one
@@ -135,7 +135,7 @@ def _mode_changes(base: Problem, motion: Motion, together: float) -> list[tuple[
     return changes
 
 
-def _instants(base: Problem, motion: Motion, together: float) -> list[tuple[float, dict[int, bool]]]:
+def _instants(base: OneContactEquations, motion: Motion, together: float) -> list[tuple[float, dict[int, bool]]]:
     """The instants at which contacts act: for each of them the contacts, and whether it is an impact (else a release)."""
     contacts = base.system.model.contacts
     names, instants = [contact.name for contact in contacts], list[tuple[float, dict[int, bool]]]()
