@@ -53,11 +53,15 @@ class Room(ModuleType):
 
 
 def _answering(found: Any) -> Any:
-    """A public function, made to refuse arguments of a wrong kind by their names; anything else is returned as it is."""
-    if not isinstance(found, FunctionType) or hasattr(found, "answers"):
+    """A public function or a dataclass, made to refuse arguments that it does not have; anything else is returned as it is."""
+    own = vars(found).get("__init__") if hasattr(found, "__dataclass_fields__") else found
+    if not isinstance(own, FunctionType) or hasattr(own, "answers"):
         return found
     from saltus.public_functions import answered
 
-    answering = answered(found)
+    answering: Any = answered(own)
+    if own is not found:
+        found.__init__ = answering
+        return found
     setattr(sys.modules[found.__module__], found.__name__, answering)  # pickle looks for it there
     return answering

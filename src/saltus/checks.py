@@ -122,7 +122,7 @@ def check_count(name: str, value: Any, at_least: int, at_most: int | None = None
     """
     at_most = MOST.get(name.rpartition(".")[2], LIMITS.count) if at_most is None else at_most
     problem = number_problem(value, at_least=at_least, at_most=at_most)
-    if problem is None and value != int(value):
+    if problem is None and not isinstance(value, (int, np.integer)):
         problem = f"must be a whole number, got {shown(value)}"
     if problem is not None:
         raise ParameterError(f"{name} {problem.replace('be a number', 'be a whole number')}", name)

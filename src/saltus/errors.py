@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+LONGEST = 380  # the most characters of a sentence, as names from a file may have any length
 LONGEST_NAME, LONGEST_LIST = 80, 200  # the most characters of a name that is compared with known ones, and of their list
 
 
@@ -16,6 +17,9 @@ class SaltusError(Exception):
     >>> issubclass(saltus.ParameterError, saltus.SaltusError)
     True
     """
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(shortened(message))
 
 
 class ParameterError(SaltusError, ValueError):
@@ -126,11 +130,18 @@ def shown(value: Any, most: int = 60) -> str:
     """A value in the form in which a sentence shows it: on one line and not longer than `most` characters."""
     if isinstance(value, int) and abs(value) >= 10**20:
         return "a very large number"  # Python itself refuses to write some of them
+    value = value[:most] if isinstance(value, (str, bytes, list, tuple)) else value  # the rest would not be seen
     try:
         text = " ".join(repr(value).split())
     except Exception:  # a user's own class may raise anything
         text = f"an object of type {type(value).__name__}"
     return text if len(text) <= most else text[: most - 3] + "..."
+
+
+def shortened(sentence: str) -> str:
+    """A sentence on one line, cut to `LONGEST` characters."""
+    line = " ".join(sentence.split())
+    return line if len(line) <= LONGEST else f"{line[: LONGEST * 2 // 3]} ... {line[-LONGEST // 3 + 5 :]}"
 
 
 def printable(text: str, most: int = 400) -> str:

@@ -140,7 +140,6 @@ def test_cells_of_a_chaotic_attractor_are_told_from_those_of_a_cycle() -> None:
         ({"periods": 3}, "periods"),
         ({"within": 0.0}, "within"),
         ({"velocity": [np.nan]}, "that rise"),
-        ({"found": 3}, "found must be an Attractors, as find_attractors gives it, got 3"),
     ],
 )
 def test_senseless_grids_are_refused(arguments: dict, says: str) -> None:

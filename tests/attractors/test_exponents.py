@@ -293,7 +293,6 @@ RECORD = saltus.Record([0.0, 1.0], [0.0, 1.0])
         ({"periods": 31}, "periods must"),
         ({"periods": 40.5}, "periods must be a whole number"),
         ({"transient": -1}, "transient must"),
-        ({"system": "a system"}, "system must be a System"),
         ({"system": saltus.System(model=saltus.Metainterface(beta0=1.4), load=saltus.Load(horizontal=RECORD))}, "is a Record"),
         ({"theta": math.nan}, "theta must be"),
         ({"phi": 0.3}, "no coordinate 'phi'"),

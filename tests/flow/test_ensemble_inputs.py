@@ -307,12 +307,6 @@ def test_mistakes_are_refused_in_one_sentence(mistake):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("system", [None, 3, SYSTEM.model, "Metainterface"])
-def test_what_is_no_system_is_refused(system):
-    with pytest.raises(ParameterError, match="system must be a System"):
-        run(system)
-
-
 def test_forcing_periods_need_a_frequency():
     with pytest.raises(ParameterError, match="no frequency"):
         run(TIMELESS)

@@ -1,12 +1,10 @@
-"""Makers of bad studies, records, JSON, files and calls: each is the same for the same seed."""
+"""Makers of bad studies, records, JSON and files: each is the same for the same seed."""
 
 import copy
-import inspect
 import json
 import math
 import random
 
-import numpy as np
 import tomli_w
 
 VALUES = (
@@ -113,39 +111,3 @@ def system_json(rng: random.Random) -> str:
     if rng.random() < 0.3:
         text = damaged(rng, text.encode()).decode("utf-8", "replace")
     return rng.choice(("[" * 5000, '{"model":' * 5000, "1" * 5000)) if rng.random() < 0.01 else text
-
-
-def objects(rng: random.Random, good) -> object:
-    """Something that is no argument, or nearly one."""
-    kinds = (
-        *VALUES,
-        None,
-        object(),
-        int,
-        good,
-        np.nan,
-        np.array([1.0, np.nan]),
-        np.zeros((2, 3)),
-        np.array(["a"]),
-        1j,
-        b"x",
-        lambda *_: 1,
-    )
-    return rng.choice(kinds)
-
-
-def call(rng: random.Random, function, good):
-    """Arguments for a function: most of the needed ones, a few of the others, any of which may be bad."""
-    given, named = [], {}
-    for parameter in inspect.signature(function).parameters.values():
-        needed = parameter.default is parameter.empty and parameter.kind is not parameter.VAR_KEYWORD
-        if parameter.name in ("workers", "scheduler", "store") or (not needed and rng.random() < 0.7):
-            continue
-        value = good if parameter.name == "system" and rng.random() < 0.8 else objects(rng, good)
-        if parameter.kind is parameter.VAR_KEYWORD:
-            named[rng.choice(("theta", "x", "period", "starts"))] = value
-        elif parameter.kind is parameter.KEYWORD_ONLY:
-            named[parameter.name if rng.random() < 0.95 else parameter.name + "s"] = value
-        else:
-            given.append(value)
-    return given, named

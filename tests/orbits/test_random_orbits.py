@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from orbit_cases import FREQUENCY
 from shared_systems import forced, walled
 
-from saltus import MotionError, ParameterError, Record, System, find_orbit, simulate
+from saltus import MotionError, ParameterError, Record, find_orbit, simulate
 from saltus.orbits import RestingOrbit
 
 pytestmark = pytest.mark.thorough  # many structures of their own
@@ -150,9 +150,3 @@ def test_arguments_without_meaning_are_refused_in_a_sentence(arguments, sentence
     with pytest.raises(ParameterError, match=sentence) as refusal:
         find_orbit(forced(), **({"parameters": (FREQUENCY,)} | arguments))
     assert "\n" not in str(refusal.value)
-
-
-@pytest.mark.parametrize("wrong", [None, "system", 3, System])
-def test_what_is_no_system_is_refused(wrong):
-    with pytest.raises(ParameterError, match="system must be a System"):
-        find_orbit(wrong, theta=0.3)

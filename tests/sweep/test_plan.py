@@ -108,7 +108,7 @@ def test_what_a_function_returns_is_what_was_planned(waves_plan, tmp_path, wrong
         ({"scheduler": "localhost"}, "an address such as 'tcp://host:8786'"),
         ({"scheduler": "tcp://localhost:1", "workers": 2}, "are given both"),
         ({"progress": 3}, "progress must be a function"),
-        ({"store": 3}, "store must be a path"),
+        ({"store": 3}, "store must be the path of a folder"),
         ({"store": "s3://a/b"}, "got the address"),
     ],
 )

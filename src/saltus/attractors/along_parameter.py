@@ -13,7 +13,7 @@ from saltus.attractors.attractors_dataset import about, attractor_columns, varia
 from saltus.attractors.find import find_attractors
 from saltus.attractors.kind import AttractorKind
 from saltus.checks import as_numbers, check_along, check_number, check_path
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, shown
 from saltus.progress import Progress, part_of, silent
 from saltus.systems import System
 from saltus.window import Box
@@ -192,7 +192,7 @@ def _values(system: System, path: str, values: Any) -> np.ndarray:
     grid = np.atleast_1d(as_numbers(values))
     steps = np.diff(grid)
     if grid.ndim != 1 or not grid.size or not np.isfinite(grid).all() or not ((steps > 0).all() or (steps < 0).all()):
-        raise ParameterError(f"values must be numbers of {path} that increase, or that decrease, got {values!r}", "values")
+        raise ParameterError(f"values must be numbers of {path} that increase, or that decrease, got {shown(values)}", "values")
     check_along(system, path, grid, "values")
     return grid
 

@@ -10,10 +10,9 @@ from typing import NoReturn
 import typer
 
 from saltus.cli.interrupt import INTERRUPTED, INTERRUPTION, interruptible
-from saltus.errors import SaltusError
+from saltus.errors import SaltusError, shortened
 
 BAD_INPUT = 2
-LONGEST = 380  # the most characters of a sentence
 
 
 @contextmanager
@@ -37,14 +36,6 @@ def guarded() -> Iterator[None]:
         stop("there is not enough memory for this; ask for fewer samples or periods", BAD_INPUT)
     except RecursionError:
         stop("what is given is nested too deeply", BAD_INPUT)
-
-
-def shortened(sentence: str) -> str:
-    """A sentence on one line, cut to `LONGEST` characters, as texts from a file may have any length."""
-    line = " ".join(sentence.split())
-    if len(line) <= LONGEST:
-        return line
-    return f"{line[: LONGEST * 2 // 3]} ... {line[-LONGEST // 3 + 5 :]}"
 
 
 def stop(sentence: str, status: int) -> NoReturn:

@@ -13,13 +13,11 @@ from saltus.continuation.end import CurveEnd, End
 from saltus.continuation.missed import Missed
 from saltus.continuation.solved_between import solved_between
 from saltus.continuation.step_length import STEPS
-from saltus.public_functions import answering
 
 Point = TypeVar("Point", bound=Any)
 Special = TypeVar("Special")
 
 
-@answering("is_joined", "solved_at", "solved_between")
 @dataclass(frozen=True, eq=False)
 class Course(Generic[Point, Special]):
     """A curve as it was followed: its points in order, its special points, and the reasons for both ends."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from saltus.checks import as_numbers, check_number
 from saltus.enumerations import Sentence
-from saltus.errors import MotionError, ParameterError
+from saltus.errors import MotionError, ParameterError, shown
 from saltus.flow import Motion, Stop, simulate
 from saltus.progress import Progress, silent
 from saltus.provenance import provenance
@@ -209,7 +209,7 @@ def _check(system: System, asking: str) -> None:
 def _numbers(amplitudes: Any) -> np.ndarray:
     grid = np.atleast_1d(as_numbers(amplitudes))
     if grid.ndim != 1 or not grid.size or not np.isfinite(grid).all():
-        raise ParameterError(f"amplitudes must be finite numbers, got {amplitudes!r}", "amplitudes")
+        raise ParameterError(f"amplitudes must be finite numbers, got {shown(amplitudes)}", "amplitudes")
     return grid
 
 

@@ -20,7 +20,6 @@ from saltus.orbits.equations.whole_motion import WholeMotionEquations
 from saltus.orbits.finding.starts import start_at
 from saltus.orbits.signature import Signature
 from saltus.orbits.tolerances import TOLERANCES
-from saltus.public_functions import answering
 from saltus.result import Result
 from saltus.systems import System
 
@@ -28,7 +27,6 @@ if TYPE_CHECKING:
     import xarray
 
 
-@answering("motion", "defect_after")
 @dataclass(frozen=True, eq=False)
 class PeriodicOrbit(Result):
     """A periodic orbit of the exact system, solved to rounding.

@@ -7,13 +7,11 @@ from typing import Any, ClassVar
 
 from saltus.checks import settle_numbers
 from saltus.errors import ParameterError
-from saltus.public_functions import answering
 from saltus.systems.friction import Friction
 from saltus.systems.load import Load, reversed_load
 from saltus.systems.model import Model
 
 
-@answering("__init__")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BeltOscillator(Model):
     """x'' + c x' + k x = F(tau) + f, a mass pressed with N(tau) on a belt of speed w; the friction f (named `belt`) is

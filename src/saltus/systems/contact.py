@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from saltus.errors import ParameterError
-from saltus.public_functions import answering
 
 MOST = 12  # The most contacts: which of them are closed is found by trying, with 2^n choices at worst.
 
 
-@answering("__init__")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contact:
     """A contact that keeps a coordinate q on one side of a position p: its gap is sign (q - p) >= 0.

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from saltus.errors import ParameterError
-from saltus.public_functions import answering
 
 Number = Any  # a float, or a parameter of the model while its equations are traced
 
 MOST_FRICTIONS = 6  # The most frictions: which stick, and which way the others slide, is found by trying 3^n choices at worst.
 
 
-@answering("__init__")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Friction:
     """Coulomb friction along a coordinate q on a ground that moves with the speed w, under the normal force N of the model:

@@ -9,7 +9,6 @@ import numpy as np
 
 from saltus.checks import settle_numbers
 from saltus.errors import ParameterError
-from saltus.public_functions import answering
 from saltus.systems.contact import Contact
 from saltus.systems.load import Load
 from saltus.systems.model import Model
@@ -47,7 +46,6 @@ class ImpactLaw:
         )
 
 
-@answering("__init__")
 @dataclass(frozen=True, slots=True)
 class VelocityReduction(ImpactLaw):
     """v+ = e v-, with a constant factor e in [0, 1] (paper, `vel_red`).
@@ -88,7 +86,6 @@ def _passes(model: Model, a: Contact, b: Contact) -> bool:
     return a is not b and a.group == b.group if model.transfers else a is b
 
 
-@answering("__init__")
 @dataclass(frozen=True, slots=True)
 class EnergyRestitution(ImpactLaw):
     """T+ = r T-, with T the model's kinetic energy, ground velocities and unequal masses included (`rest_def`, errata 5, 26).
@@ -133,7 +130,6 @@ class EnergyRestitution(ImpactLaw):
         return np.where(square >= 0, np.where(through * velocity > 0, through, np.nan), np.nan)
 
 
-@answering("__init__")
 @dataclass(frozen=True, slots=True)
 class InelasticImpact(ImpactLaw):
     """Frictionless, perfectly inelastic contact: the momentum balance of the layer that is not hit fixes v+ (errata 25).

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from saltus.checks import settle_numbers
-from saltus.public_functions import answering
 from saltus.systems.contact import Contact
 from saltus.systems.load import Load, reversed_load
 from saltus.systems.model import Model
 
 
-@answering("__init__")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImpactPair(Model):
     """An impact damper: a case on a spring, at z, and a mass in it at the distance x from the case's middle, |x| <= d:

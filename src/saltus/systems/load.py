@@ -8,7 +8,6 @@ from typing import Any
 
 from saltus.checks import check_number
 from saltus.errors import ParameterError
-from saltus.public_functions import answering
 from saltus.systems.signals import Record, Signal, as_signal, scaled
 
 
@@ -66,7 +65,6 @@ class Channel:
         return self._derivative(t, 2)
 
 
-@answering("__init__")
 @dataclass(frozen=True, init=False, repr=False)
 class Load:
     """The loads on a system: `Load(frequency=Omega, horizontal=Harmonic(amplitude=H), vertical=-0.5)`.

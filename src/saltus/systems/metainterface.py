@@ -10,14 +10,12 @@ import numpy as np
 
 from saltus.checks import settle_numbers
 from saltus.errors import ParameterError
-from saltus.public_functions import answering
 from saltus.systems.layered_cell import LayeredCell
 from saltus.systems.load import Load, reversed_load
 from saltus.systems.model import MarginKind
 from saltus.systems.signals import Constant, Signal, scaled, vanishes
 
 
-@answering("__init__")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Metainterface(LayeredCell):
     """The single-degree-of-freedom metainterface (paper, `gov_eqn_theta_long`).

@@ -7,7 +7,6 @@ from enum import StrEnum
 from typing import Any, ClassVar
 
 from saltus.errors import ParameterError, near, shown
-from saltus.public_functions import answering
 from saltus.systems.constrained import constrained_acceleration
 from saltus.systems.contact import Contact
 from saltus.systems.friction import Friction
@@ -27,7 +26,6 @@ class MarginKind(StrEnum):
     LIMIT = "limit"  #: the mechanism has no such positions
 
 
-@answering("unit_of", "margin_kind")
 class Model:
     """A piecewise-smooth oscillator. Subclass it as a frozen, keyword-only dataclass of numbers and give it:
 

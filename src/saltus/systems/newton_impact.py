@@ -9,13 +9,12 @@ import numpy as np
 
 from saltus.checks import check_number, settle_numbers
 from saltus.errors import ParameterError
-from saltus.public_functions import answered, answering
+from saltus.public_functions import answered
 from saltus.systems.factors import Factors
 from saltus.systems.impact import ImpactLaw
 from saltus.systems.model import Model
 
 
-@answering("__init__")
 @dataclass(frozen=True, slots=True)
 class NewtonImpact(ImpactLaw):
     """0 <= J _|_ v+ + E v- >= 0 at all contacts whose gap is 0, with the rates v of the gaps and the impulses J (Moreau).

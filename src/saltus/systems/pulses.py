@@ -11,7 +11,6 @@ import numpy as np
 
 from saltus.checks import RADIANS, settle_numbers
 from saltus.errors import ParameterError
-from saltus.public_functions import answering
 from saltus.systems.pulse import RATE, TIME, Pulse
 
 RICKER_REACH = 7.0  # the largest argument u: beyond it (2 u^2 - 1) exp(-u^2) is below 1e-19, less than rounding of the load
@@ -28,7 +27,6 @@ def sinusoid(rate: Any, phase: Any, since: Any, n: int) -> Any:
     return (np.sin(phase) - np.sin(rate * since + phase)) / (rate * rate) + np.cos(phase) / rate * since
 
 
-@answering("__init__")
 @dataclass(frozen=True, kw_only=True)
 class HalfSine(Pulse):
     """amplitude sin(frequency s) for 0 <= s <= pi / frequency, s the time since `start`.
@@ -63,7 +61,6 @@ class HalfSine(Pulse):
         return self.amplitude * sinusoid(self.frequency, 0.0, since, n)
 
 
-@answering("__init__")
 @dataclass(frozen=True, kw_only=True)
 class OneSine(HalfSine):
     """amplitude sin(frequency s) for one period, 0 <= s <= 2 pi / frequency; of acceleration, a forward pulse of the velocity.
@@ -92,7 +89,6 @@ class OneSine(HalfSine):
         return 2.0 * math.pi / self.frequency
 
 
-@answering("__init__")
 @dataclass(frozen=True, kw_only=True)
 class OneCosine(OneSine):
     """amplitude cos(frequency s) for one period; it jumps where it begins and where it ends.
@@ -120,7 +116,6 @@ class OneCosine(OneSine):
         return self.amplitude * sinusoid(self.frequency, 0.5 * math.pi, since, n)
 
 
-@answering("__init__")
 @dataclass(frozen=True, kw_only=True)
 class MavroeidisPapageorgiou(Pulse):
     """The near-fault pulse of Mavroeidis and Papageorgiou (2003), BSSA 93(3), their velocity pulse:
@@ -177,7 +172,6 @@ class MavroeidisPapageorgiou(Pulse):
         return 0.5 * self.amplitude * (carrier + 0.5 * (above + below))
 
 
-@answering("__init__")
 @dataclass(frozen=True, kw_only=True)
 class Ricker(Pulse):
     """The symmetric Ricker wavelet amplitude (1 - 2 u^2) exp(-u^2), u = frequency (s - 7 (2 / frequency)) / 2.
@@ -219,7 +213,6 @@ class Ricker(Pulse):
         return factor * hermite * np.exp(-(u * u))
 
 
-@answering("__init__")
 @dataclass(frozen=True, kw_only=True)
 class Ramp(Pulse):
     """amplitude s / duration for 0 <= s <= duration, and `amplitude` for ever after.
@@ -258,7 +251,6 @@ class Ramp(Pulse):
         return slope * powers.get(n, 0.0)
 
 
-@answering("__init__")
 @dataclass(frozen=True, kw_only=True)
 class Chirp(Pulse):
     """amplitude sin(frequency s + (end_frequency - frequency) s^2 / (2 duration)) for 0 <= s <= duration: a linear sweep.

@@ -9,12 +9,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from saltus.checks import RADIANS, settle_numbers
-from saltus.public_functions import answering
 from saltus.systems.load import Load, reversed_load
 from saltus.systems.model import MarginKind, Model
 
 
-@answering("__init__")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RockingBlock(Model):
     """A rigid block rocking about its base corners, without bouncing (paper, `EOM&Rock`).

@@ -10,7 +10,6 @@ from typing import Any
 
 from saltus.checks import check_number, settle_numbers
 from saltus.errors import ParameterError
-from saltus.public_functions import answering
 from saltus.systems.load import Load
 from saltus.systems.metainterface import Metainterface
 from saltus.systems.pulse import Pulse, in_other_units
@@ -18,7 +17,6 @@ from saltus.systems.signals import Record, Signal, Sum, scaled
 from saltus.systems.two_layer import TwoLayer
 
 
-@answering("__init__", "from_model", "metainterface", "two_layer", "load", "load_in_si")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PhysicalCell:
     """Length, masses, rotational stiffnesses and dampings of a cell in SI units; layer 1 is the lower one, 2 the upper one.

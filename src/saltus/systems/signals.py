@@ -15,7 +15,6 @@ import numpy as np
 
 from saltus.checks import RADIANS, check_count, check_number, settle_numbers
 from saltus.errors import ParameterError, shown
-from saltus.public_functions import answering
 
 
 class Signal:
@@ -55,7 +54,6 @@ class Constant(Signal):
         return self.value if order == 0 else 0.0
 
 
-@answering("__init__")
 @dataclass(frozen=True, slots=True)
 class Harmonic(Signal):
     """mean + amplitude sin(order Omega tau + phase), with the base frequency Omega of the load and an integer order.
@@ -145,7 +143,6 @@ def _samples(where: str, name: str, given: Any) -> np.ndarray:
     return samples.astype(float)
 
 
-@answering("__init__")
 @dataclass(frozen=True, eq=False)
 class Record(Signal):
     """Samples over time, uniform or not: `Record(time, value, quantity=...)`, dimensionless like every load.

@@ -10,7 +10,6 @@ from typing import Any
 from saltus.errors import ParameterError, near, shown
 from saltus.files import parsed_json
 from saltus.notebook import html_table
-from saltus.public_functions import answering
 from saltus.systems.contact import check_contacts
 from saltus.systems.friction import check_frictions
 from saltus.systems.impact import ImpactLaw, VelocityReduction
@@ -21,7 +20,6 @@ from saltus.systems.parameters import children, numbers, replace
 from saltus.systems.serial import from_dict, to_dict
 
 
-@answering("__init__", "with_", "get", "from_dict", "from_json", "from_toml")
 @dataclass(frozen=True, kw_only=True)
 class System:
     """A model, its load and its impact law: all that is needed to repeat a motion.
@@ -56,6 +54,14 @@ class System:
     impact: ImpactLaw = field(default_factory=VelocityReduction)
 
     def __post_init__(self) -> None:
+        kinds = {
+            "model": (Model, "a Model, such as Metainterface(beta0=1.4)"),
+            "load": (Load, "a Load, such as Load(frequency=1.0)"),
+        }
+        kinds["impact"] = (ImpactLaw, "an ImpactLaw, such as VelocityReduction(0.9)")
+        for name, (kind, words) in kinds.items():
+            if not isinstance(getattr(self, name), kind):
+                raise ParameterError(f"{name} must be {words}, got {shown(getattr(self, name))}", name)
         check_sides(self.model)
         for channel in self.load.channels:
             if channel not in self.model.channels:

@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.public_functions import answering
 from saltus.systems.constrained import reactions
 from saltus.systems.contact import Contact
 from saltus.systems.layered_cell import LayeredCell
@@ -19,7 +18,6 @@ from saltus.systems.signals import vanishes
 CONTACTS = (Contact(name="lower", coordinate="theta_1"), Contact(name="upper", coordinate="theta_2", sign=-1))
 
 
-@answering("__init__")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TwoLayer(LayeredCell):
     """The metainterface with theta_1 >= 0 of the lower and theta_2 <= 0 of the upper layer (paper, `eomnl`).

@@ -7,13 +7,11 @@ from typing import Any, ClassVar
 
 from saltus.checks import settle_numbers
 from saltus.errors import ParameterError
-from saltus.public_functions import answering
 from saltus.systems.contact import Contact
 from saltus.systems.load import Load, reversed_load
 from saltus.systems.model import Model
 
 
-@answering("__init__")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TwoStops(Model):
     """x'' + c x' + k x = F(tau) for d_1 <= x <= d_2: contacts `left` and `right`, with an impact law such as `NewtonImpact`.

@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.checks import RADIANS, check_number, settle_numbers
 from saltus.errors import ParameterError, shown
-from saltus.public_functions import Numbers, answering
+from saltus.public_functions import Numbers
 from saltus.systems.cell_layout import CellLayout
 from saltus.systems.metainterface import Metainterface
 from saltus.systems.si_units import PhysicalCell
@@ -19,8 +19,6 @@ from saltus.systems.two_layer import TwoLayer
 ANGLE_ROUNDING = 1e-12  # an angle past a limit by no more than this is rounded onto it
 
 
-@answering("__init__", "line_condition", "beta", "phi", "theta", "alpha", "alpha_of_phi", "beta_of_phi")
-@answering("xi", "eta", "phi_velocity", "small_phi", "layout")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UnitCell:
     """Two articulated parallelograms, each with a slider amid its diagonal (paper, `gen_conf` to `max_disp_condition`).

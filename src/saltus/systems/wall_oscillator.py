@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from saltus.checks import settle_numbers
-from saltus.public_functions import answering
 from saltus.systems.load import Load
 from saltus.systems.model import Model
 
 
-@answering("__init__")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WallOscillator(Model):
     """x'' + c x' + k x = F(tau), free while x < d; at the wall x = d the velocity turns round, v+ = -e v-.

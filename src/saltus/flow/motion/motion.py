@@ -17,7 +17,7 @@ from saltus.flow.motion.dense_output import DenseOutput
 from saltus.flow.motion.stops import Stop
 from saltus.flow.motion.validity import Validity, ValidityCheck
 from saltus.notebook import html_table
-from saltus.public_functions import Numbers, answering
+from saltus.public_functions import Numbers
 from saltus.result import Result, table_of
 from saltus.systems import System
 
@@ -173,7 +173,6 @@ class Samples:
     side: np.ndarray
 
 
-@answering("at", "closed_at", "samples", "to_pandas", "to_xarray")
 @dataclass(frozen=True, eq=False)
 class Motion(Result):
     """An exact motion of a system.

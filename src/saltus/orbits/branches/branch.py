@@ -15,7 +15,6 @@ from saltus.orbits.branches.orbit_curve import OrbitPoint
 from saltus.orbits.branches.resting_family import RestingPoint
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialPoint
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.public_functions import answering
 from saltus.result import Result
 
 if TYPE_CHECKING:
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
 START = End(OrbitEnd.START)
 
 
-@answering("at")
 @dataclass(frozen=True, eq=False)
 class Branch(Result, Course[OrbitPoint | RestingPoint, SpecialPoint]):
     """A branch: its points in order, its special points, and why it ends on both sides.

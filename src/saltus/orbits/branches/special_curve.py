@@ -17,7 +17,6 @@ from saltus.orbits.equations.newton import Solution
 from saltus.orbits.equations.one_contact import OrbitEvaluation
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.provenance import provenance
-from saltus.public_functions import answering
 from saltus.result import Result
 
 if TYPE_CHECKING:
@@ -110,7 +109,6 @@ def without_condition(point: SpecialCurvePoint) -> OrbitPoint:
     )
 
 
-@answering("at")
 @dataclass(frozen=True, eq=False)
 class SpecialCurve(Result, Course[SpecialCurvePoint, SpecialPoint]):
     """A curve of special points in two parameters: its points in order, its codimension-two points, and why it ends.

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.checks import as_numbers, check_bounds, check_count, check_step
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, shown
 from saltus.orbits import STEP
 from saltus.progress import Progress, growing, part_of, silent
 from saltus.public_functions import checked_by
@@ -237,7 +237,7 @@ def _values(bounds: tuple[float, float], values: Iterable[float] | None, count: 
         return np.linspace(*bounds, count)
     grid = as_numbers(values)
     if grid.ndim != 1 or not grid.size:
-        raise ParameterError(f"values must be numbers at which to search, got {values!r}", "values")
+        raise ParameterError(f"values must be numbers at which to search, got {shown(values)}", "values")
     outside = grid[~((grid >= bounds[0]) & (grid <= bounds[1]))]
     if outside.size:
         raise ParameterError(
