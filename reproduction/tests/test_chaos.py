@@ -6,7 +6,7 @@ import xarray as xr
 from claim_verdicts import claims_of, verdicts
 from spectrum_cases import branch, diagram
 
-from saltus.attractors import Unsettled
+from saltus.flow import Ending
 from saltus_paper import ClaimVerdict
 from saltus_paper.figures.harmonic_loads import under_force
 from saltus_paper.measures import chaos_measures
@@ -25,7 +25,7 @@ def panel(*spans, wandering=(), bounds=(0.0, 3.0), stable=True, others=()):
     table = {
         "exponent": np.where(wanders, 0.1, np.nan),
         "error": np.where(wanders, 0.01, np.nan),
-        "verdict": np.where(chaotic, Unsettled.CHAOTIC, Unsettled.TRANSIENT),
+        "verdict": np.where(chaotic.CHAOTIC, Ending.TRANSIENT),
     }
     tree["exponents"] = xr.DataTree(xr.Dataset({k: ("value", v) for k, v in table.items()}, {"value": values}))
     tree.attrs["system"] = under_force().to_json()

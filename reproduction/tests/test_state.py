@@ -111,7 +111,7 @@ def test_other_parameters_make_it_again(tmp_path, registry):
         ("saltus.plots.basins", False),  # other inner files of a room that it uses
         ("saltus.theory.rocking", False),
         ("saltus.sweep.plan", False),  # and of rooms that it does not
-        ("saltus.attractors.find", False),
+        ("saltus.attractors.attractor_search", False),
     ],
 )
 def test_a_figure_is_out_of_date_by_a_change_in_what_it_uses_and_by_no_other(module, changes, monkeypatch, tmp_path):

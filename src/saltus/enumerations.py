@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enum import Enum, IntEnum
-from typing import Self
+from typing import Any, Self
 
 
 class NumberedSentence(IntEnum):
@@ -20,6 +20,11 @@ class NumberedSentence(IntEnum):
 
     def __str__(self) -> str:
         return self.sentence
+
+
+def flags(kind: type[NumberedSentence]) -> dict[str, Any]:
+    """The attributes that say what the numbers of a variable mean, after the CF conventions."""
+    return {"flag_values": [int(member) for member in kind], "flag_meanings": " ".join(member.name.lower() for member in kind)}
 
 
 class Sentence(Enum):

@@ -11,10 +11,9 @@ from attractor_cases import strobes
 from shared_systems import forced, steady, walled
 
 from saltus.attractors import basins_of_attraction
-from saltus.attractors.basins.basin_cells import Grid, cell_arguments, cells
+from saltus.attractors.attractor_search import Attractors, find_attractors
+from saltus.attractors.basins.basin_cells import Grid, Labelling, cell_arguments, cells
 from saltus.attractors.basins.grid import _relabelled
-from saltus.attractors.basins.labelling import Labelling
-from saltus.attractors.find import Attractors, find_attractors
 from saltus.errors import ParameterError
 from saltus.plots import figure_of
 from saltus.plots.basins import draw_basins

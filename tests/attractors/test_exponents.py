@@ -14,9 +14,8 @@ from verdict_cases import spread
 import saltus
 from saltus import ParameterError
 from saltus.attractors import lyapunov_many, lyapunov_spectrum
-from saltus.attractors.lyapunov.area_contraction import Contraction, impact_factor
-from saltus.attractors.lyapunov.renormalisation import span_count
-from saltus.attractors.lyapunov.settings import LYAPUNOV
+from saltus.attractors.lyapunov.averages import LYAPUNOV, span_count
+from saltus.attractors.lyapunov.spectrum import Contraction, impact_factor
 from saltus.theory import equilibria
 
 

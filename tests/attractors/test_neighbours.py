@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import saltus
-from saltus.attractors.lyapunov.largest_exponent import LargestExponents
-from saltus.attractors.lyapunov.neighbours import SETTINGS, Neighbours
-from saltus.attractors.lyapunov.stretching import stretched
+from saltus.attractors.lyapunov.averages import LYAPUNOV
+from saltus.attractors.lyapunov.growth import LargestExponents, Neighbours, stretched
 from saltus.flow import find_recurrence
 from saltus.systems import Harmonic, Load, NewtonImpact, System, TwoLayer
 
@@ -45,7 +44,7 @@ def test_the_exponent_of_an_orbit_is_that_of_its_multiplier_also_where_neighbour
     """With much damping these pairs come nearer in four periods than two motions can tell."""
     orbit = saltus.find_orbit(layers(2.0, damping=damping, e=0.0), theta_1=0.1, theta_2=0.0)
     expected = math.log(abs(orbit.multipliers[0])) / orbit.duration
-    assert (4 * orbit.duration * expected < math.log(SETTINGS.least)) == together
+    assert (4 * orbit.duration * expected < math.log(LYAPUNOV.least_of_pair)) == together
     begin = np.repeat(np.concatenate(orbit.section_state[None, None]), 4, axis=0)[None]
     rates, _ = Neighbours(orbit.system, begin, {}, turning=32, tol=1e-12).rates(np.array([0]), 16)
     np.testing.assert_allclose(rates[0], expected, rtol=0, atol=1e-4)

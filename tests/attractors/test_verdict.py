@@ -8,16 +8,16 @@ from shared_systems import forced, walled
 
 import saltus
 from saltus import ParameterError
-from saltus.attractors import classify, excludes_tori
-from saltus.attractors.kind import AttractorKind
+from saltus.attractors import classify, excludes_tori, zero_one_test
 from saltus.attractors.orbit_certificate import certify
-from saltus.flow import find_recurrence
+from saltus.flow import Ending, find_recurrence
+from saltus.orbits import state_vector
 from saltus.theory import equilibria
 
 
 def test_rest_is_proved():
     verdict = classify(forced(0.05, 1.0), theta=0.01)
-    assert verdict.kind == "rest"
+    assert str(verdict.kind) == "rest"
     assert verdict.period is None
     assert verdict.state == {"theta": 0.0, "velocity": 0.0}
     assert "captured" in verdict.reason
@@ -27,7 +27,7 @@ def test_rest_is_proved():
 def test_a_periodic_motion_is_certified_by_its_own_equations(e):
     system = forced(0.5, 1.0, e=e)
     verdict = classify(system, theta=0.3)
-    assert (verdict.kind, verdict.period) == ("periodic", 1)
+    assert (str(verdict.kind), verdict.period) == ("periodic", 1)
     expected = saltus.find_orbit(system, theta=0.3)
     assert verdict.orbit.amplitude == pytest.approx(expected.amplitude, abs=1e-10)
     assert verdict.evidence["residual"] < 1e-12
@@ -52,7 +52,7 @@ def test_a_longer_period_is_counted_in_forcing_periods():
 def test_an_orbit_with_rest_is_periodic():
     """Below one, e lets impacts die away; the load pulls the system off its contact again, twice a period."""
     verdict = classify(forced(0.12, 0.05, e=0.3), theta=0.05)
-    assert verdict.kind == "periodic"
+    assert str(verdict.kind) == "periodic"
     assert verdict.orbit.rest_share > 0.1
     assert verdict.evidence["largest_multiplier"] == 0.0
     assert verdict.evidence["largest_exponent"] == -math.inf
@@ -68,7 +68,7 @@ def test_chaos_is_seen_with_its_exponent(frequency, amplitude, known, periods):
     """
     system = forced(amplitude, frequency)
     verdict = classify(system, theta=0.3, periods=periods)
-    assert verdict.kind == "chaotic"
+    assert str(verdict.kind) == "chaotic"
     assert verdict.exponents.values[0] == pytest.approx(known, abs=0.15 * known + float(verdict.exponents.errors[0]))
     assert verdict.exponents.sum_defect < 1e-8
     assert verdict.zero_one.K > 0.8
@@ -76,8 +76,21 @@ def test_chaos_is_seen_with_its_exponent(frequency, amplitude, known, periods):
     assert excludes_tori(system) is not None
     data = verdict.to_xarray()
     assert data.kind == "chaotic"
-    assert data.largest_exponent == verdict.exponents.values[0]
+    assert data.largest_exponent == pytest.approx(verdict.exponents.values[0], abs=float(verdict.exponents.errors[0]) + 0.02)
     assert saltus.System.from_json(data.attrs["system"]) == system
+
+
+def test_chaos_in_several_narrow_bands_of_the_section_is_chaos():
+    """Near the end of the cascade of period doublings the chaos visits its bands in turn: the 0-1 test of all states sees order in
+    it, and of every eighth state chaos. The exponent is that of a motion's derivatives, by another code than the judge's."""
+    system = forced(0.2, 0.39783)
+    verdict = classify(system, theta=0.3, transient=4000, periods=4000)
+    assert verdict.kind is Ending.CHAOTIC
+    assert verdict.exponents.values[0] - verdict.exponents.errors[0] > 0.0
+    assert verdict.exponents.values[0] == pytest.approx(verdict.evidence["largest_exponent"], rel=0.3)
+    assert verdict.zero_one.K > 0.8
+    section = find_recurrence(system, state_vector(system, verdict.state)[None], 4000, kept=4000).states[0, :, 0]
+    assert zero_one_test(section).K < 0.2
 
 
 MORE = [pytest.param(amplitude, marks=pytest.mark.thorough) for amplitude in (7.4, 7.5, 7.6)]
@@ -99,12 +112,10 @@ def test_long_chaotic_transients_are_not_called_chaos(amplitude):
     assert late[slowest] > 1200  # known to settle, later than the first look of the verdict below
     theta, velocity = starts[slowest]
     verdict = classify(system, theta=theta, velocity=velocity, periods=1000, transient=100)
-    assert verdict.kind in ("periodic", "undecided")
-    if verdict.kind == "undecided":
+    assert str(verdict.kind) in ("periodic", "undecided")
+    if str(verdict.kind) == "undecided":
         assert "transient" in verdict.reason
         assert verdict.evidence["companions_settled"] > 0
-        assert verdict.exponents.positive  # without the companions it would have been chaos
-        assert verdict.zero_one.K > 0.8  # and the 0-1 test sees nothing wrong
 
 
 def test_given_time_a_transient_is_followed_to_its_end():
@@ -113,7 +124,7 @@ def test_given_time_a_transient_is_followed_to_its_end():
     slowest = int(np.nanargmax(late))
     theta, velocity = starts[slowest]
     verdict = classify(system, theta=theta, velocity=velocity, periods=4000)
-    assert (verdict.kind, verdict.period) == ("periodic", int(cycle[slowest]))
+    assert (str(verdict.kind), verdict.period) == ("periodic", int(cycle[slowest]))
     assert verdict.periods == pytest.approx(late[slowest], abs=1)
 
 
@@ -125,8 +136,8 @@ def test_a_motion_that_settles_while_its_exponents_are_taken_is_periodic_after_a
         classify(system, theta=starts[i, 0], velocity=starts[i, 1], periods=600, transient=0)
         for i in np.flatnonzero(late > 700)[:3]
     ]
-    assert {verdict.kind for verdict in verdicts} <= {"periodic", "undecided"}
-    after_all = [verdict for verdict in verdicts if verdict.kind == "periodic"]
+    assert {str(verdict.kind) for verdict in verdicts} <= {"periodic", "undecided"}
+    after_all = [verdict for verdict in verdicts if str(verdict.kind) == "periodic"]
     assert after_all
     for verdict in after_all:
         assert verdict.evidence["transient"] >= 600
@@ -147,14 +158,14 @@ def test_a_slow_passage_by_a_fold_is_no_attractor(at_the_fold):
     """Just below the fold there is no orbit any more, but motions dwell where it was for thousands of periods, and then rest."""
     theta, velocity = at_the_fold.state
     early = classify(forced(0.0219879514 - 1e-8, 1.0), theta=theta, velocity=velocity + 1e-4, periods=200, transient=50)
-    assert early.kind == "undecided"
+    assert str(early.kind) == "undecided"
     assert "torus is excluded" in early.reason
     assert early.evidence["no_tori"]
     late = classify(forced(0.0219879514 - 1e-7, 1.0), theta=theta, velocity=velocity + 1e-4, periods=4000)
-    assert late.kind == "rest"
+    assert str(late.kind) == "rest"
     assert late.periods > 1000
     during = classify(late.system, theta=theta, velocity=velocity + 1e-4, periods=late.periods - 300, transient=0)
-    assert during.kind == "rest"  # though the exponents are lost on the way
+    assert str(during.kind) == "rest"  # though the exponents are lost on the way
     assert np.isnan(during.evidence["largest_exponent"])
     assert during.periods == pytest.approx(late.periods, abs=1)
 
@@ -163,34 +174,33 @@ def test_a_slow_approach_to_an_orbit_is_periodic(at_the_fold):
     """A multiplier of 0.998: after hundreds of periods the motion is still on its way; the orbit's equations tell to where."""
     theta, velocity = at_the_fold.state
     verdict = classify(at_the_fold.system, theta=theta, velocity=velocity + 1e-4, periods=96, transient=0)
-    assert (verdict.kind, verdict.period) == ("periodic", 1)
+    assert (str(verdict.kind), verdict.period) == ("periodic", 1)
     assert "slowly" in verdict.reason
     assert verdict.evidence["distance"] < 1e-4
     assert verdict.evidence["largest_multiplier"] == pytest.approx(abs(at_the_fold.multipliers[0]), abs=1e-6)
-    assert not verdict.exponents.positive
 
 
 def test_a_torus_is_quasi_periodic():
     """Undamped motion about a deformed equilibrium under a weak force: a curve of the map, as KAM theory has it."""
     system = forced(0.002, 1.0, C=0.0, V=0.5)
     verdict = classify(system, theta=0.03, periods=300)
-    assert verdict.kind == "quasi-periodic"
+    assert str(verdict.kind) == "quasi-periodic"
     assert (np.abs(verdict.exponents.values) < 1e-3).all()
     assert abs(verdict.zero_one.K) < 0.1
     linear = classify(walled(c=0.0, W=math.sqrt(5) - 1, wall=20.0), x=0.3, periods=300)
-    assert linear.kind == "quasi-periodic"
+    assert str(linear.kind) == "quasi-periodic"
     assert (np.abs(linear.exponents.values) < 1e-12).all()
 
 
 def test_with_damping_the_same_start_ends_on_an_orbit():
     verdict = classify(forced(0.002, 1.0, C=0.1, V=0.5), theta=0.03)
-    assert (verdict.kind, verdict.period) == ("periodic", 1)
+    assert (str(verdict.kind), verdict.period) == ("periodic", 1)
 
 
 def test_an_orbit_that_does_not_attract_is_no_attractor():
     """Undamped, linear, started on its periodic solution F / (k - W^2) cos W tau: multipliers of modulus 1."""
     verdict = classify(walled(c=0.0, k=1.0, A=0.2, W=1.5, wall=20.0), x=0.2 / (1.0 - 2.25))
-    assert verdict.kind == "undecided"
+    assert str(verdict.kind) == "undecided"
     assert "does not attract" in verdict.reason
     assert verdict.evidence["largest_multiplier"] == pytest.approx(1.0, abs=1e-9)
 
@@ -200,12 +210,12 @@ def test_under_constant_loads_it_comes_to_an_equilibrium():
         model=saltus.Metainterface(beta0=math.radians(80), damping=0.1), load=saltus.Load(horizontal=0.1, vertical=0.5)
     )
     verdict = classify(system, theta=0.4)
-    assert verdict.kind == "periodic"
+    assert str(verdict.kind) == "periodic"
     assert "equilibrium" in verdict.reason
     stable = [q.theta for q in equilibria(system) if q.stable]
     assert min(abs(verdict.state["theta"] - theta) for theta in stable) < 1e-9
     free = classify(system.with_({"model.damping": 0.0}), theta=0.4, periods=256)
-    assert free.kind == "undecided"
+    assert str(free.kind) == "undecided"
     assert "constant loads" in free.reason
 
 
@@ -217,10 +227,10 @@ def test_a_motion_that_ends_is_undecided():
         impact=saltus.VelocityReduction(0.9),
     )
     verdict = classify(system, theta=0.1)
-    assert verdict.kind == "undecided"
+    assert str(verdict.kind) == "undecided"
     assert "where its margin overturned reaches 0" in verdict.reason
     torn = classify(forced(0.3, 1.0, C=0.1, V=0.5, e=0.0), theta=0.3, velocity=-3.0)
-    assert torn.kind == "undecided"
+    assert str(torn.kind) == "undecided"
     assert "not unique" in torn.reason
 
 
@@ -240,7 +250,7 @@ def test_verdicts_repeat_themselves():
     one, other = (classify(forced(3.0, 1.6), theta=0.3, periods=96, transient=50, seed=4) for _ in range(2))
     assert one.reason == other.reason
     assert one.evidence == other.evidence
-    assert one.kind in set(AttractorKind)
+    assert one.kind in set(Ending)
 
 
 def test_progress_goes_from_nothing_to_all():

@@ -1,11 +1,13 @@
 """The 0-1 test on series whose nature is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from saltus import ParameterError
 from saltus.attractors import zero_one_test
-from saltus.attractors.verdict.zero_one_test import _displacement
+from saltus.attractors.zero_one import _displacement, zero_one_of_bands
 
 
 def logistic(rate, count, start=0.3, skip=200):
@@ -31,6 +33,29 @@ def test_it_sees_the_order_of_a_golden_rotation():
 def test_it_sees_order_on_cycles(rate):
     """The logistic map has attracting cycles of 1, 2, 4 and 3 steps at these rates."""
     assert abs(zero_one_test(logistic(rate, 1000, skip=4000)).K) < 0.1
+
+
+@pytest.mark.parametrize(("rate", "bands"), [(3.575, 8), (3.59, 4), (3.65, 2)])
+def test_chaos_in_several_bands_is_seen_on_every_nth_number(rate, bands):
+    """Below 3.5926 the logistic map has chaos in 4 bands or more, below 3.6786 in 2. That it is chaos its exponent shows, the
+    average of ln abs(f'), which has nothing to do with the test."""
+    series = logistic(rate, 20_000)
+    assert np.mean(np.log(np.abs(rate * (1 - 2 * series)))) > 0.05
+    assert zero_one_test(series[:8000], every=bands).K > 0.95
+    assert zero_one_of_bands(series[:8000]).K > 0.95
+    assert zero_one_test(series[:8000], every=bands) == replace(zero_one_test(series[:8000:bands]), every=bands)
+
+
+def test_weak_chaos_in_very_many_bands_looks_regular_to_it():
+    """Why it has no vote on chaos: at the rate 3.57 the exponent is 0.0105, and K of 20 000 numbers is near 0."""
+    series = logistic(3.57, 20_000, skip=10_000)
+    assert np.mean(np.log(np.abs(3.57 * (1 - 2 * series)))) == pytest.approx(0.0105, abs=0.001)
+    assert zero_one_test(series).K < 0.05
+
+
+def test_it_sees_order_on_every_nth_number_of_a_torus():
+    for rotation in ((np.sqrt(5) - 1) / 2, np.sqrt(2) - 1, np.pi - 3):
+        assert zero_one_of_bands(np.cos(2 * np.pi * rotation * np.arange(4000))).K < 0.2
 
 
 def test_a_mean_does_not_hide_anything():

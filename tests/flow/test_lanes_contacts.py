@@ -8,7 +8,7 @@ from test_contacts import BETA80, layers
 
 import saltus
 from saltus.errors import MotionError
-from saltus.flow import Outcome, find_recurrence, stop_names
+from saltus.flow import Ending, find_recurrence, stop_names
 from saltus.systems import Harmonic, InelasticImpact, Load, Metainterface, NewtonImpact, System, TwoStops, VelocityReduction
 
 CASES = 150
@@ -157,7 +157,7 @@ def test_recurrence_finds_motions_of_both_layers():
     system = System(model=saltus.TwoLayer(beta0=BETA80, damping=0.1), load=load, impact=InelasticImpact())
     states = np.array([[0.1, 0.0, 0.0, 0.0], [0.0, -0.3, 0.0, 0.0]])
     found = find_recurrence(system, states, 400, kept=4, extrema=True)
-    assert (found.outcome == Outcome.PERIODIC).all()
+    assert (found.outcome == Ending.PERIODIC).all()
     assert (found.period == 1).all()
     np.testing.assert_allclose(found.highest, 0.5694, atol=5e-5)
     assert found.states.shape[2] == 4

@@ -5,7 +5,7 @@ import pytest
 from shared_systems import forced
 
 import saltus
-from saltus.flow import RECURRENCE, Outcome, find_recurrence, load_releases, nearest_return, return_distances, return_period
+from saltus.flow import RECURRENCE, Ending, find_recurrence, load_releases, nearest_return, return_distances, return_period
 from saltus.flow.long_time.recurrence import _long_period
 from saltus.systems import Harmonic, Load, RockingBlock, System
 
@@ -129,4 +129,4 @@ def test_a_motion_followed_to_the_end_has_the_period_that_is_found_on_the_way():
 
 
 def test_each_outcome_says_what_it_is():
-    assert len({str(outcome) for outcome in Outcome}) == len(Outcome)
+    assert len({str(outcome) for outcome in Ending}) == len(Ending)

@@ -7,8 +7,7 @@ import pytest
 from shared_systems import forced, under
 
 from saltus import ParameterError, WallOscillator, continue_orbit, find_orbit
-from saltus.attractors import Unsettled
-from saltus.flow import Outcome, find_recurrence
+from saltus.flow import Ending, find_recurrence
 from saltus.orbits import SpecialKind
 from saltus.studies import chaotic_bands
 from saltus.studies.diagram.band_edges import band_origins
@@ -68,7 +67,7 @@ def test_a_cascade_of_long_periods_is_followed_to_its_chaos_beside_another_attra
     assert inside.tolist() == [False, True]
     states = np.random.default_rng(2).uniform(-4.0, 4.0, (40, 2))
     ends = find_recurrence(system, states, 20_000, parameters={FREQUENCY: np.full(40, 3.809)}, max_period=64, kept=130)
-    assert 0 < (ends.outcome == Outcome.MOVING).sum() < 20  # plain simulation: few random motions stay in that chaos
+    assert 0 < (ends.outcome == Ending.UNDECIDED).sum() < 20  # plain simulation: few random motions stay in that chaos
 
 
 def test_the_brackets_of_edges_are_narrow(quasi_periodic_band):
@@ -89,7 +88,7 @@ def test_bands_exclude_long_transients_and_the_more_so_beside_transients():
         assert 3.0 * tried.life[within].sum() >= SETTINGS.judgements[1].exposure
         for edge in (band.lower, band.upper):
             inner, outer = np.searchsorted(tried.values, [edge.inner, edge.outer])
-            if tried.verdict[outer] == Unsettled.TRANSIENT:
+            if tried.verdict[outer] == Ending.TRANSIENT:
                 assert tried.life[inner] >= min(SETTINGS.longer * tried.life[outer], longest)
                 beside += tried.life[outer] > 1000.0
     assert beside  # such transients are longer than those that the first judgement excludes
@@ -114,7 +113,7 @@ def test_plain_simulation_agrees_with_the_bands_at_random_values(quasi_periodic_
     ends = find_recurrence(
         forced(0.2), states.reshape(-1, 2), 2000, parameters={FREQUENCY: np.repeat(values, 6)}, max_period=64, kept=130
     )
-    goes_on = (ends.outcome == Outcome.MOVING).reshape(-1, 6).any(axis=1)
+    goes_on = (ends.outcome == Ending.UNDECIDED).reshape(-1, 6).any(axis=1)
     in_band = np.array([any(value in band for band in quasi_periodic_band.bands) for value in values])
     assert 5 < in_band.sum() < len(values)
     assert (goes_on == in_band).mean() > 0.9  # but for windows narrower than a hundredth of the range
@@ -139,14 +138,14 @@ def test_there_is_no_chaos_in_a_linear_oscillator():
     )
     found = bands(linear, FREQUENCY, (0.5, 2.0))
     assert found.bands == ()
-    assert (found.tried.verdict == Unsettled.PERIODIC).all()
+    assert (found.tried.verdict == Ending.PERIODIC).all()
 
 
 def test_transients_of_chaos_at_high_frequency_make_no_band():
     """numerics.md and the issue: Omega = 4, Hhat between 7.2 and 7.3."""
     found = bands(forced(7.2, 4.0), AMPLITUDE, (7.2, 7.3), count=3, settings=replace(COARSE, step=0.1, fine_step=0.1))
     assert found.bands == ()
-    assert (found.tried.verdict == Unsettled.TRANSIENT).any()  # it does look like chaos for hundreds of periods
+    assert (found.tried.verdict == Ending.TRANSIENT).any()  # it does look like chaos for hundreds of periods
 
 
 @pytest.mark.thorough

@@ -7,7 +7,7 @@ import pytest
 from shared_systems import forced
 
 from saltus import stability_chart
-from saltus.attractors import Unsettled
+from saltus.flow import Ending
 from saltus.studies.diagram.chaos_search import BandSearch
 from saltus.studies.diagram.chaos_settings import SETTINGS
 from saltus.studies.diagram.diagram_work import DiagramWork
@@ -25,7 +25,7 @@ def test_a_row_of_fig_14_and_the_diagram_along_it_have_chaos_at_the_same_values(
     chart = stability_chart(system, horizontal=values, vertical=[-0.5, -0.499], window=((-2.0, 2.0), (-2.0, 2.0)), starts=8)
     row = chart.isel(vertical=0)
     open_ = row["unsettled"].values > 0
-    in_chart = open_ & (row["verdict"].values == Unsettled.CHAOTIC)
+    in_chart = open_ & (row["verdict"].values == Ending.CHAOTIC)
     states = np.random.default_rng(4).uniform(-1.5, 1.5, (len(values) * 24, 2))
     begun = simulate_from(system, AMPLITUDE, np.repeat(values, 24), states, 300)
     settings = replace(SETTINGS, step=0.02, fine_step=0.02, edge=2e-3)
@@ -34,8 +34,8 @@ def test_a_row_of_fig_14_and_the_diagram_along_it_have_chaos_at_the_same_values(
     bands = search.bands
     in_diagram = np.array([any(value in band for band in bands.bands) for value in values])
     at = np.searchsorted(bands.tried.values, values)
-    long_transient = (bands.tried.verdict[at] == Unsettled.TRANSIENT) & (bands.tried.life[at] > 1000.0)  # a chart looks less long
-    left_open = (open_ & (row["verdict"].values == Unsettled.UNDECIDED)) | bands.tried.undecided[at] | long_transient
+    long_transient = (bands.tried.verdict[at] == Ending.TRANSIENT) & (bands.tried.life[at] > 1000.0)  # a chart looks less long
+    left_open = (open_ & (row["verdict"].values == Ending.UNDECIDED)) | bands.tried.undecided[at] | long_transient
     assert in_diagram.any()
     assert not in_diagram.all()
     assert not (in_chart & ~in_diagram & ~left_open).any()

@@ -9,8 +9,8 @@ import pytest
 
 import saltus
 from saltus import branch_of
-from saltus.attractors import Doubt, Unsettled, judge_unsettled
-from saltus.flow import Outcome, Stop
+from saltus.attractors import Reason, judge
+from saltus.flow import Ending, Stop
 from saltus.orbits import initial_states, orbits_near_returns, search_orbits, solved_near
 from saltus.plots import draw_diagram, draw_stability_chart
 from saltus.studies import bifurcation_diagram, bordered_chart, response_spectrum, stability_chart
@@ -179,8 +179,8 @@ def test_what_the_massless_hinge_ends_is_neither_rest_nor_settled():
     states = initial_states(pressed, 6, window, 0)
     stops_of = {saltus.simulate(pressed, theta_1=a, theta_2=b, velocity=v, periods=400).stop for a, b, *v in states}
     assert stops_of == {Stop.SINGULAR}
-    judged = judge_unsettled(pressed, states[None], {})
-    assert (judged.verdict[0], judged.doubt[0]) == (Unsettled.UNDECIDED, Doubt.LIMIT)
+    judged = judge(pressed, states[None], {})
+    assert (judged.ending[0], judged.reason[0]) == (Ending.UNDECIDED, Reason.LIMIT)
     chart = stability_chart(pressed, horizontal=[0.9], vertical=[-1.0], starts=6)
     assert (int(chart["outcome"][0, 0]), int(chart["unsettled"][0, 0])) == (CellOutcome.UNDECIDED, 6)
     few = {"values": [1.0], "starts": 6, "max_period": 1, "bands": False, "effort": "quick"}
@@ -267,7 +267,7 @@ def test_impacts_that_die_away_are_not_counted_where_chaos_is_looked_for():
             value=np.full(n, 0.5),
             periods=np.ones(n),
             last=np.zeros((n, 4)),
-            outcome=np.full(n, Outcome.PERIODIC),
+            outcome=np.full(n, Ending.PERIODIC),
             period=np.ones(n, dtype=int),
             impact_count=np.array([113, 122, 2, 3]),
             highest=np.ones(n),

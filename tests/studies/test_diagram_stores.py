@@ -20,7 +20,7 @@ from saltus import provenance
 from saltus.cli.app import app
 from saltus.errors import ParameterError, SweepError
 from saltus.files import write_dataset
-from saltus.flow import Outcome
+from saltus.flow import Ending
 from saltus.provenance import identity
 from saltus.studies import response_spectrum
 from saltus.studies.diagram import diagram_work
@@ -159,7 +159,7 @@ def test_a_motion_that_has_settled_is_the_same_however_long_it_is_given():
     work, direct = (diagram_work.DiagramWork(system, FREQUENCY, made) for made in (Parts(common), None))
     work.simulate(values, states, 200)
     rows = [(given[3], row[1]) for given, row in work.parts.remembered(diagram_work._parts(2)["motions"])]
-    moving = sum(outcome == Outcome.MOVING for time, outcome in rows if time == 200)
+    moving = sum(outcome == Ending.UNDECIDED for time, outcome in rows if time == 200)
     assert 0 < moving < len(values)
     longer, fresh = work.simulate(values, states, 400), direct.simulate(values, states, 400)
     for field in fields(fresh):

@@ -10,7 +10,7 @@ import xarray as xr
 from shared_systems import forced
 
 import saltus
-from saltus.attractors import Unsettled
+from saltus.flow import Ending
 from saltus.progress import growing, silent
 from saltus.studies.diagram import side_by_side as module
 from saltus.studies.diagram.diagram_work import DiagramWork
@@ -49,7 +49,7 @@ def test_values_that_are_judged_with_different_care_at_the_same_time_have_the_sa
         search = SearchedRange(DiagramWork(forced(1.0), AMPLITUDE), (1.74, 1.77))
         search.follow([Begun(1.755, states, 0), Begun(1.76, states, 1), Begun(1.765, states, 0)])
         found.append(search.tried())
-    assert (found[0].verdict == Unsettled.CHAOTIC).sum() >= 2
+    assert (found[0].verdict == Ending.CHAOTIC).sum() >= 2
     for one, other in zip(*(vars(tried).values() for tried in found), strict=True):
         assert np.array_equal(one, other, equal_nan=True)
 

@@ -1,37 +1,34 @@
 from .along_parameter import attractors_along
-from .attractor import Attractor, Attractors, Target
+from .attractor import Attractor, Attractors, Target, share_interval
+from .attractor_search import find_attractors
 from .basins.fractal import BasinEntropy, UncertaintyExponent, Wada, basin_entropy, uncertainty_exponent, wada
 from .basins.grid import basins_of_attraction
-from .find import find_attractors
-from .lyapunov.ensemble import lyapunov_many
+from .classification import Verdict, classify
+from .judgement import JUDGEMENT, EarlierJudgement, Judged, JudgementSettings, SettledLater, judge
+from .lyapunov.many_exponents import lyapunov_many
 from .lyapunov.spectrum import Exponents, lyapunov_spectrum
-from .manifolds.equilibria import Equilibrium, equilibria
-from .manifolds.phase_plane import Separatrix, separatrices
+from .manifolds.phase_plane import Equilibrium, Separatrix, equilibria, separatrices
 from .manifolds.saddle_manifolds import Manifold, stable_manifold, unstable_manifold
-from .sampled_share import share_interval
-from .verdict.classification import classify
-from .verdict.tori import excludes_tori
-from .verdict.unsettled import JUDGEMENT, Doubt, Earlier, Judged, JudgementSettings, SettledLater, Unsettled, judge_unsettled
-from .verdict.verdict import Verdict
-from .verdict.zero_one_test import ZeroOne, zero_one_test
+from .reason import Reason
+from .tori import excludes_tori
+from .zero_one import ZeroOne, zero_one_test
 
 __all__ = [
     "JUDGEMENT",
     "Attractor",
     "Attractors",
     "BasinEntropy",
-    "Doubt",
-    "Earlier",
+    "EarlierJudgement",
     "Equilibrium",
     "Exponents",
     "Judged",
     "JudgementSettings",
     "Manifold",
+    "Reason",
     "Separatrix",
     "SettledLater",
     "Target",
     "UncertaintyExponent",
-    "Unsettled",
     "Verdict",
     "Wada",
     "ZeroOne",
@@ -42,7 +39,7 @@ __all__ = [
     "equilibria",
     "excludes_tori",
     "find_attractors",
-    "judge_unsettled",
+    "judge",
     "lyapunov_many",
     "lyapunov_spectrum",
     "separatrices",

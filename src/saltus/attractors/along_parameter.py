@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.attractors.attractor import REST, Attractor, Attractors, Target
-from saltus.attractors.attractors_dataset import about, attractor_columns, variable
-from saltus.attractors.find import find_attractors
-from saltus.attractors.kind import AttractorKind
+from saltus.attractors.attractor import REST, Attractor, Attractors, Target, about, attractor_columns, variable
+from saltus.attractors.attractor_search import find_attractors
 from saltus.checks import as_numbers, check_along, check_number, check_path
 from saltus.errors import ParameterError, shown
+from saltus.flow import Ending
 from saltus.progress import Progress, part_of, silent
 from saltus.systems import System
 from saltus.window import Box
@@ -179,7 +178,7 @@ def set_distance(one: Target, other: Target) -> float:
 def _apart(old: Attractor, new: Attractor, led: bool) -> float:
     """The distance of two attractors, scaled up for different periods, and down where motions from the old one settle on the new
     one."""
-    if AttractorKind.REST in (old.kind, new.kind):
+    if Ending.REST in (old.kind, new.kind):
         return set_distance(old.target, new.target) if old.kind == new.kind else np.inf
     distance = set_distance(old.target, new.target)
     if old.period != new.period:

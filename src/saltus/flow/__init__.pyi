@@ -17,7 +17,7 @@ from .long_time.approach import approached
 from .long_time.load_release import Release, contact_pull, load_releases, peak_near
 from .long_time.recurrence import (
     RECURRENCE,
-    Outcome,
+    Ending,
     Recurrence,
     RecurrenceSettings,
     ensemble_from,
@@ -44,6 +44,7 @@ __all__ = [
     "ContactColumn",
     "ContactRegularity",
     "DenseOutput",
+    "Ending",
     "Event",
     "EventCode",
     "EventKind",
@@ -53,7 +54,6 @@ __all__ = [
     "Lanes",
     "Motion",
     "MotionRequest",
-    "Outcome",
     "Program",
     "Recurrence",
     "RecurrenceSettings",

@@ -16,7 +16,7 @@ from saltus.plots.drawing import drawing
 from saltus.plots.exponents import NAME, ZERO
 from saltus.plots.response import BAND_NAMES, BANDS, draw_bands
 
-VERDICTS = {"undecided": "x", "chaotic": "o", "transient": "^", "regular": "s"}
+VERDICTS = {"undecided": "x", "chaotic": "o", "transient": "^", "periodic": "s", "quasi_periodic": "D"}
 
 
 @drawing
@@ -52,13 +52,13 @@ def _draw_deciding_exponents(below: Axes, tree: Any) -> list[Any]:
     draw_bands(below, tree)
     handles = []
     table = tree["exponents"]
-    verdict, meanings = table["verdict"].values, table["verdict"].attrs["flag_meanings"].split()
-    for number, meaning in enumerate(meanings):
+    verdict, marked = table["verdict"].values, table["verdict"].attrs
+    for number, meaning in zip(marked["flag_values"], marked["flag_meanings"].split(), strict=True):
         here = (verdict == number) & np.isfinite(table["exponent"].values)
         if here.any():
             columns = (table[column].values[here] for column in ("value", "exponent", "error"))
             marks: dict[str, Any] = {"color": INK, "fmt": VERDICTS[meaning], "ms": 3.0, "mfc": "white", "lw": 0.6, "mew": 0.6}
-            handles.append(below.errorbar(*columns, capsize=1.5, label=f"exponent, 95 %: {meaning}", **marks))
+            handles.append(below.errorbar(*columns, capsize=1.5, label=f"exponent, 95 %: {meaning.replace('_', '-')}", **marks))
     if not np.isfinite(table["exponent"].values).any():
         below.text(0.5, 0.5, "all motions settle", transform=below.transAxes, ha="center", va="bottom")
         below.set_yticks([0.0])

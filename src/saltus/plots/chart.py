@@ -29,6 +29,7 @@ FILLINGS: dict[str, tuple[str | None, str, str, str]] = {
     "motions_and_chaos": (None, "//////", INK, "chaos beside motions"),
     "chaos": ("#8c8c8c", "//////", "white", "chaos alone"),
     "long": ("#dedede", "------", INK, "long period, or slow"),
+    "quasi_periodic": ("#dedede", "||||||", INK, "quasi-periodic"),
     "undecided": ("#dedede", "xxxxxx", INK, "undecided"),
 }
 BORDERS: dict[str, Any] = {"LP": "-", "PD": (0, (5, 1.5)), "BPC": (0, (5, 1.2, 1, 1.2)), "GR": (0, (1, 1.1))}
@@ -148,7 +149,7 @@ def has_speeds(chart: Any) -> bool:
 def with_outcome(chart: Any, name: str) -> np.ndarray:
     """Which cells of a chart have the outcome with this name in `flag_meanings`, (vertical, horizontal)."""
     outcome = chart["outcome"].transpose("vertical", "horizontal")
-    number = dict(zip(outcome.attrs["flag_meanings"].split(), np.ravel(outcome.attrs["flag_values"]), strict=True))[name]
+    number = dict(zip(outcome.attrs["flag_meanings"].split(), np.ravel(outcome.attrs["flag_values"]), strict=True)).get(name, -1)
     return np.asarray(outcome.values == number)
 
 

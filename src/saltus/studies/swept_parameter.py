@@ -12,7 +12,7 @@ import numpy as np
 
 from saltus.checks import check_along, check_axis, check_count, check_number, check_path
 from saltus.errors import ParameterError
-from saltus.flow import Outcome, Recurrence, find_recurrence, rate_name
+from saltus.flow import Ending, Recurrence, find_recurrence, rate_name
 from saltus.progress import Progress, silent
 from saltus.provenance import provenance
 from saltus.public_functions import checked_by
@@ -292,7 +292,7 @@ def _dataset(asked: SweepRequest, runs: tuple[_OneWay, _OneWay], jumps: list[tup
     outcome = np.full((2, count), "", dtype="<U8")
     for run, values, words in zip(runs, zip(*table.values(), strict=True), outcome, strict=True):
         places = np.searchsorted(asked.grid, run.values)
-        words[places] = [Outcome(int(row.outcome[0])).name.lower() for row in run.rows]
+        words[places] = [Ending(int(row.outcome[0])).name.lower() for row in run.rows]
         for column, (read, _, _) in zip(values, columns.values(), strict=True):
             column[places] = [read(row) for row in run.rows]
     over = ("direction", "value")

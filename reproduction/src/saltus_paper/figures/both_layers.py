@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.flow import Outcome, Recurrence, find_recurrence, simulate
+from saltus.flow import Ending, Recurrence, find_recurrence, simulate
 from saltus.systems import NewtonImpact, System, TwoLayer
 from saltus_paper.claims.claim import Measured, measured
 from saltus_paper.figure_data import dataset, joined
@@ -85,7 +85,7 @@ def fates(system: System, variant: tuple[float, float, float], parameters: dict[
     fate[end.periodic] = FATES.index("other")
     for name in ("moved", "near", "same"):
         fate[end.periodic & (shift <= getattr(SETTINGS, name)) & (end.period == one.period)] = FATES.index(name)
-    fate[end.rest | (end.outcome == Outcome.HELD)] = FATES.index("rest")
+    fate[end.rest | (end.outcome == Ending.HELD)] = FATES.index("rest")
     fate[end.ended] = FATES.index("ended")
     return fate, np.where(end.periodic, end.highest, np.nan)
 

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.attractors import Unsettled, excludes_tori
+from saltus.attractors import excludes_tori
+from saltus.flow import Ending
 from saltus.plots import DOUBLE_COLUMN, FAINT, POINTS, STABLE, UNSTABLE, draw_bands, new_figure, panel_label, styled
 from saltus.studies import chaotic_bands
 from saltus_paper.claims.claim import Measured, measured
@@ -73,8 +74,8 @@ def _exponents(ax: Any, tree: Any) -> None:
     ax.axhline(0.0, color=FAINT, lw=0.6, zorder=1)
     table = tree["exponents"]
     for kind, colour, face, label in (
-        (Unsettled.CHAOTIC, STABLE, STABLE, "chaotic"),
-        (Unsettled.UNDECIDED, UNSTABLE, "white", "undecided"),
+        (Ending.CHAOTIC, STABLE, STABLE, "chaotic"),
+        (Ending.UNDECIDED, UNSTABLE, "white", "undecided"),
     ):
         here = table["verdict"].values == kind
         ax.errorbar(
@@ -91,7 +92,7 @@ def measure(data: Any) -> dict[str, Measured | None]:
 
 def _resolved(panel: Any) -> Measured:
     bands, table, reason = panel["bands"], panel["exponents"], panel.attrs["torus"]
-    periodic = int(np.isin(table["verdict"].values, (Unsettled.PERIODIC, Unsettled.TRANSIENT)).sum())
+    periodic = int(np.isin(table["verdict"].values, (Ending.PERIODIC, Ending.TRANSIENT)).sum())
     largest = float(np.max(bands["exponent"].values, initial=-np.inf))
     return measured(
         bool(reason) and largest > 0.0 and periodic > 0,

@@ -10,12 +10,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.attractors.attractor import REST, SAME_STATE, UNDECIDED, Attractor, Attractors, Target
-from saltus.attractors.attractors_dataset import about, attractor_table, labels, state_plane, state_units, variable
-from saltus.attractors.basins.basin_cells import Grid, check_basin_store, computed_cells
+from saltus.attractors.attractor import (
+    REST,
+    SAME_STATE,
+    UNDECIDED,
+    Attractor,
+    Attractors,
+    Target,
+    about,
+    attractor_table,
+    labels,
+    state_plane,
+    state_units,
+    variable,
+)
+from saltus.attractors.attractor_search import find_attractors
+from saltus.attractors.basins.basin_cells import Grid, Labelling, check_basin_store, computed_cells
 from saltus.attractors.basins.boundaries import basin_boundaries
-from saltus.attractors.basins.labelling import Labelling
-from saltus.attractors.find import find_attractors
 from saltus.attractors.stroboscopic_section import with_clock
 from saltus.checks import (
     LIMITS,

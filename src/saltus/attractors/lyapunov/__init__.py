@@ -1,7 +1,6 @@
 """Lyapunov exponents, through the saltation of every impact.
 
-`spectrum` computes all exponents of one motion, `ensemble` both exponents of many motions with one coordinate at once (by
-`tangent_frames`), `largest_exponent` the largest one only, from `perturbations` by derivatives (`stretching`) or by pairs of
-motions (`neighbours`). They share `renormalisation` (how a run is begun and cut into spans) and `averages` (the mean over a run).
-`two_trajectory` and `area_contraction` are independent checks.
+`spectrum` computes all exponents of one motion, with two independent checks; `many_exponents` both exponents of many motions with
+one coordinate at once; `growth` the largest exponent only, for the judge. They share `averages`: the mean over a run and its
+error, and how a run is begun and cut into spans.
 """

@@ -1,4 +1,4 @@
-"""Averages along a motion: the mean of a correlated series from a long run, and its error."""
+"""Averages along a motion: the mean of a correlated series with its error, and how the run behind it is begun and cut."""
 
 from __future__ import annotations
 
@@ -8,7 +8,39 @@ from typing import Any
 
 import numpy as np
 
-from saltus.attractors.lyapunov.settings import LYAPUNOV
+from saltus.attractors.stroboscopic_section import check_periodic
+from saltus.checks import check_count, check_number
+from saltus.flow import Motion
+from saltus.systems import System, check_system
+
+
+@dataclass(frozen=True)
+class LyapunovSettings:
+    """How long runs are cut, how their error bars are taken, and what the comparisons allow."""
+
+    batches: int = 16  # The least number of batches from which a standard error is taken.
+    student: float = 2.131449545559323  # The two-sided 95 % point of Student's t with batches - 1 degrees of freedom.
+    stretches: int = 32  # The number of stretches of a search, whose means give error bars to both halves of the run.
+    longest_span: float = 6.5  # Derivatives grow and shrink by less than 1e6 in this time, a forcing period at Omega = 1.
+    look_back: int = 160  # The forcing periods after the run within which it is tested whether a motion repeats itself.
+    lossless: float = 1.0 - 1e-14  # A product of impact factors below this counts as below 1.
+    largest_group: int = 256  # The most motions that one thread follows together: enough to make the cost of a call small.
+    look: float = 0.2  # The time between checks for Ctrl-C and reports of progress, s.
+    distance: float = 1e-7  # Of two trajectories: far above the error of a period, small enough for the map to be linear.
+    accuracy: float = 1e-5  # The error of the exponent from two trajectories that their own numerical errors cause.
+    tolerance: float = 1e-14  # The error of a step of the two trajectories.
+    rounding: float = 1e-13  # Derivatives below this share of the largest are 0: contacts or frictions hold that direction.
+    # The longest time between two renormalisations of a pair of motions, in units of time, but at least a forcing period: with an
+    # exponent of 0.3 the distance of neighbours grows by a factor of 2000 in it, to 2e-4.
+    pair_span: float = 26.0
+    pair_periods: int = 16  # The largest number of forcing periods between two renormalisations of a pair.
+    # The smallest factor of the distance of a pair that is measured by the pair: the distance is then 100 times the error of a
+    # step. Smaller factors are measured by derivatives.
+    least_of_pair: float = 1e-4
+    every: int = 16  # The number of periods between calls of the progress.
+
+
+LYAPUNOV = LyapunovSettings()
 
 
 def weights(count: int) -> np.ndarray:
@@ -93,3 +125,43 @@ def _largest_standard_error(series: np.ndarray) -> Any:
         result = np.maximum(result, means.std(axis=0, ddof=1) / np.sqrt(count))
         length *= 2
     return result
+
+
+def check_run(function: str, system: Any, periods: Any, transient: Any, tol: float) -> None:
+    """Refuse systems that have no exponents, and runs too short for error bars of their halves.
+
+    Raises
+    ------
+    ParameterError
+        The error has the name of the argument.
+    """
+    check_system(system, function, several_contacts=True)
+    check_periodic(system)
+    check_count("periods", periods, 2 * LYAPUNOV.batches)
+    check_count("transient", transient, 0)
+    check_number("tol", tol, at_least=1e-15, at_most=1e-6)
+
+
+def period_length(system: System) -> float:
+    """The forcing period; under constant loads 1, a unit of time, is taken instead."""
+    return system.load.period or 1.0
+
+
+def span_count(length: float) -> int:
+    """Into how many spans a period of this length is cut."""
+    return max(1, math.ceil(length / LYAPUNOV.longest_span))
+
+
+def first_frame(size: int) -> np.ndarray:
+    """An orthonormal frame to begin with, (size, size), of random directions.
+
+    A frame along the coordinates may lie in an invariant plane of a system, and would stay in it until rounding moves it out.
+    """
+    frame: np.ndarray = np.linalg.qr(np.random.default_rng(0).standard_normal((size, size)))[0]
+    return frame
+
+
+def state_of(motion: Motion) -> dict[str, Any]:
+    """The state at the end of a motion, as `simulate` takes it."""
+    names = motion.system.model.coordinates
+    return {**dict(zip(names, np.atleast_1d(motion.position).tolist(), strict=True)), "velocity": motion.velocity}

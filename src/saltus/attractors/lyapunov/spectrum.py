@@ -1,26 +1,153 @@
-"""Lyapunov exponents of a motion, through saltation at every impact."""
+"""Lyapunov exponents of a motion, through saltation at every impact, and two independent checks of them."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.attractors.lyapunov.area_contraction import Contraction
-from saltus.attractors.lyapunov.averages import Estimate, average, resolution, uncertainty
-from saltus.attractors.lyapunov.renormalisation import check_run, first_frame, period_length, span_count, state_of
-from saltus.attractors.lyapunov.settings import LYAPUNOV
-from saltus.attractors.lyapunov.two_trajectory import separation_growth
-from saltus.flow import Motion, Stop, sensitivities, simulate
+from saltus.attractors.lyapunov.averages import (
+    LYAPUNOV,
+    Estimate,
+    average,
+    check_run,
+    first_frame,
+    period_length,
+    resolution,
+    span_count,
+    state_of,
+    uncertainty,
+)
+from saltus.bounds import Interval, Leaves, enclose, reads
+from saltus.flow import EventKind, Motion, Stop, sensitivities, simulate
+from saltus.orbits import states_beside
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import Numbers
 from saltus.result import Result, result_dataset
 from saltus.systems import System
+from saltus.taylor import Expr, differentiate, substitute, trace
 
 if TYPE_CHECKING:
     import xarray
+
+VELOCITY = Expr("velocity", (), 0)
+
+
+class Contraction:
+    """ln det of the flow's derivative along a motion of a system with one coordinate.
+
+    ln det Phi = sum over impacts of ln(R_v v+ / v-) + sum over sides s of (da/dv)_s T_s, where R(v-) is the law of impact and T_s
+    the time on the side; for the metainterface (da/dv)_s = -C c^P / (1 + m)^P, and R_v v+ / v- = e^2 (numerics.md, section 5).
+    It is independent of the derivatives that are carried along the motion.
+    """
+
+    def __init__(self, system: System) -> None:
+        traced = trace(system)
+        self._leaves = Leaves([Interval(value) for value in system.parameters.values()], [])
+        sides = system.model.sides or (1,)
+        damping = {s: substitute(differentiate(traced.acceleration[0], VELOCITY), {Expr("side"): float(s)}) for s in sides}
+        after = traced.velocity_after
+        self._slopes = {}
+        if after is not None:
+            self._slopes = {s: differentiate(substitute(after, {Expr("side"): float(s)}), VELOCITY) for s in sides}
+        known = not any(reads(d, "time", "coordinate", "velocity", "record") for d in damping.values())
+        known &= not any(reads(slope, "record") for slope in self._slopes.values())
+        single = len(system.model.coordinates) == 1 and not system.model.held
+        self.known = known and single  # whether da/dv is constant on each side
+        linear = {s: d for s, d in self._slopes.items() if not reads(d, "time", "velocity", "record")}
+        self._factors = {s: _middle(enclose([d], self._leaves)[0]) for s, d in linear.items()}
+        self._rates = {s: _middle(enclose([d], self._leaves)[0]) for s, d in damping.items()} if self.known else {}
+
+    def along(self, motion: Motion) -> float:
+        """ln det from the start of a motion to its end; -inf if it rests in between, NaN if da/dv is not constant on a side."""
+        if not self.known:
+            return float("nan")
+        if len(motion.events.of(EventKind.REST)):
+            return float("-inf")
+        impacts = motion.impacts
+        bounds = np.concatenate([[motion.start], impacts.time, [motion.time]])
+        sides = np.append(impacts.side, motion.side)
+        total = sum(rate * np.diff(bounds)[sides == side].sum() for side, rate in self._rates.items())
+        for side in set(impacts.side.tolist()):
+            here = impacts.side == side
+            before, after = impacts.velocity_before[here], impacts.velocity_after[here]
+            with np.errstate(divide="ignore"):
+                total += np.log(np.abs(self._slope(int(side), impacts.time[here], before) * after / before)).sum()
+        return float(total)
+
+    def _slope(self, side: int, time: np.ndarray, before: np.ndarray) -> Any:
+        """R_v at impacts with these velocities."""
+        if side in self._factors:
+            return self._factors[side]
+        (slope,) = enclose([self._slopes[side]], Leaves(self._leaves.parameters, [], Interval(time), speed=Interval(before)))
+        return _middle(slope)
+
+
+def impact_factor(system: System, parameters: Mapping[str, np.ndarray]) -> np.ndarray:
+    """The product over the sides of abs(dv+/dv-) of impacts without speed, for arrays of parameters: if it is below 1, impacts
+    lead to rest.
+
+    Its shape is () or that of the arrays; it is NaN if the impact law has no slope there, and 0 if contacts or frictions hold a
+    coordinate.
+    """
+    traced = trace(system)
+    if traced.velocity_after is None:
+        return np.zeros(()) if system.model.held else np.ones(())
+    values = [Interval(np.asarray(parameters.get(path, value), dtype=float)) for path, value in system.parameters.items()]
+    product = np.ones(())
+    for side in system.model.sides:
+        slope = differentiate(substitute(traced.velocity_after, {Expr("side"): float(side)}), VELOCITY)
+        product = product * np.abs(_middle(enclose([slope], Leaves(values, []))[0]))
+    return product
+
+
+def _middle(bounds: Interval) -> np.ndarray:
+    """The value of an expression of exact numbers, whose bounds differ by rounding only."""
+    middle: np.ndarray = 0.5 * (bounds.lo + bounds.hi)
+    return middle
+
+
+def separation_growth(
+    system: System, state: dict[str, Any], periods: int, length: float, progress: Progress = silent
+) -> np.ndarray:
+    """ln(distance after a period / distance before) for each period, (periods,); -inf once both states are the same.
+
+    After each period the second state is moved along the line to the first one, back to the distance of 1e-7 (Benettin, Galgani,
+    Giorgilli and Strelcyn, Meccanica 15 (1980) 9). The two may lie on different sides of the contact, or have different numbers
+    of impacts. Of several contacts, those that are closed in the first state are closed in the second.
+    """
+    here = _vector(state)
+    away = np.full(here.size, LYAPUNOV.distance / np.sqrt(here.size))
+    growth = np.full(periods, -np.inf)
+    for p in range(periods):
+        beside, following = states_beside(system, here, away), _mapped(system, here, length)
+        before = float(np.linalg.norm(beside - here))
+        apart = _mapped(system, beside, length) - following
+        distance = float(np.linalg.norm(apart))
+        if distance == 0.0 or before == 0.0:
+            break
+        growth[p] = np.log(distance / before)
+        here, away = following, apart * (LYAPUNOV.distance / distance)
+        if p % LYAPUNOV.every == LYAPUNOV.every - 1:
+            progress((p + 1) / periods, "two trajectories")
+    return growth
+
+
+def _vector(state: dict[str, Any]) -> np.ndarray:
+    """Coordinates, then velocities."""
+    return np.concatenate([np.atleast_1d(values) for values in state.values()]).astype(float)
+
+
+def _mapped(system: System, state: np.ndarray, length: float) -> np.ndarray:
+    """The state a period later."""
+    names = system.model.coordinates
+    velocity = state[len(names) :].tolist()
+    start: dict[str, Any] = dict(zip(names, state[: len(names)].tolist(), strict=True))
+    start["velocity"] = velocity[0] if len(names) == 1 else tuple(velocity)
+    return _vector(state_of(simulate(system, **start, duration=length, tol=LYAPUNOV.tolerance, dense=False)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,5 +1,5 @@
 """Invariant manifolds of saddles: the curves between basins.
 
-`saddle_manifolds` are those of saddle orbits in the stroboscopic section, grown by `manifold_growth`; under a constant load
-`equilibria` computes the equilibria of the phase plane and `phase_plane` the separatrices of its saddles.
+`saddle_manifolds` are those of saddle orbits in the stroboscopic section; under a constant load `phase_plane` computes the
+equilibria and the separatrices of its saddles.
 """

@@ -1,27 +1,176 @@
-"""Separatrices of the phase plane under a constant load: the stable manifolds of its saddles, by the exact backward flow.
+"""The phase plane under a constant load: the equilibria of any model of one coordinate, and the separatrices of its saddles.
 
-The manifolds of a saddle are tangent to (1, lambda) there, with its eigenvalues lambda (see `equilibria`).
+At an equilibrium (q*, 0) on a side the flow is q'' = a_q (q - q*) + a_v q', with the eigenvalues lambda^2 - a_v lambda - a_q = 0:
+a saddle where a_q > 0. At the contact the system rests while the accelerations of all its sides push it into the contact. The
+stable manifolds of a saddle, which are tangent to (1, lambda) there, are computed by the exact backward flow.
 """
 
 from __future__ import annotations
 
+import cmath
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.attractors.manifolds.equilibria import Equilibrium, equilibria
-from saltus.attractors.manifolds.manifold_growth import has_left
-from saltus.attractors.manifolds.saddle_manifolds import PLANE
+from saltus.attractors.manifolds.saddle_manifolds import PLANE, has_left
+from saltus.attractors.stroboscopic_section import check_periodic
 from saltus.checks import check_number
+from saltus.errors import ParameterError
 from saltus.flow import Motion, simulate
 from saltus.result import Result, result_dataset
-from saltus.systems import System, VelocityReduction, reversed_system
+from saltus.systems import Constant, System, VelocityReduction, check_system, reversed_system
 from saltus.window import Box, Window, check_window
 
 if TYPE_CHECKING:
     import xarray
+
+
+@dataclass(frozen=True)
+class EquilibriumSettings:
+    """How equilibria are found, and their eigenvalues."""
+
+    grid: int = 2001  # Number of points of the window between which equilibria are looked for.
+    difference: float = 1e-3  # Derivatives are central differences of sixth order with this step.
+    neutral: float = 1e-9  # Real parts up to this count as 0: where no energy is lost the differences leave such an error.
+    inside: float = 1e-6  # If the acceleration at the contact is 0, its sign is that at this distance inside the side.
+
+
+EQUILIBRIA = EquilibriumSettings()
+SIXTH_ORDER = ((1, 45 / 60), (2, -9 / 60), (3, 1 / 60))  # (step, weight) of the central difference for a first derivative
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """An equilibrium under a constant load.
+
+    Attributes
+    ----------
+    place
+        The coordinate.
+    side
+        The side on which it lies, 0 at the contact.
+    eigenvalues
+        The eigenvalues, the one with the larger real part first; None at the contact.
+    stable
+        Whether no disturbance grows; disturbances need not decay.
+
+    Examples
+    --------
+    >>> places = saltus.attractors.equilibria(tristable, window=((-2.0, 2.0), (-2.0, 2.0)))
+    >>> bool(np.allclose([rest.place for rest in places], [rest.theta for rest in saltus.theory.equilibria(tristable)]))
+    True
+    """
+
+    place: float
+    side: int
+    eigenvalues: tuple[complex, complex] | None
+    stable: bool
+
+    @property
+    def saddle(self) -> bool:
+        """Whether one disturbance grows and another one decays."""
+        return self.eigenvalues is not None and self.eigenvalues[0].real > 0.0 > self.eigenvalues[1].real
+
+
+def equilibria(system: System, window: Box = PLANE) -> tuple[Equilibrium, ...]:
+    """The equilibria in a window of the phase plane, by their coordinate, including the contact if the system can rest there.
+
+    They are the zeros of the acceleration at rest between 2001 points of the window: two equilibria that are closer together than
+    a thousandth of it, as near a fold, may be missed.
+
+    Parameters
+    ----------
+    system
+        What moves, under a constant load.
+    window
+        A pair (low, high) for the coordinate and one for the velocity.
+
+    Raises
+    ------
+    ParameterError
+        A load that is not constant, several coordinates, a window without meaning.
+
+    Examples
+    --------
+    >>> rests = saltus.attractors.equilibria(tristable, window=((-2.0, 2.0), (-2.0, 2.0)))
+    >>> [rest.stable for rest in rests]
+    [True, False, True, False, True]
+    """
+    check_constant(system)
+    area = check_window(window, system)
+    model, low, high = system.model, *area[0]
+    found = []
+    for side in model.sides or (1,):
+        grid = np.linspace(low, high, EQUILIBRIA.grid)
+        if model.sides:
+            grid = np.sort(np.append(grid[np.asarray(model.gap(grid, side)) > 0.0], _beside(system, side)))
+        pull = _pull(system, side)
+        for place in _zeros(pull, grid[(grid >= low) & (grid <= high)]):
+            values = _eigenvalues(system, place, side)
+            found.append(Equilibrium(place, side, values, values[0].real <= EQUILIBRIA.neutral))
+    if model.sides and low <= float(model.contact) <= high:
+        found += _at_contact(system)
+    return tuple(sorted(found, key=lambda one: one.place))
+
+
+def check_constant(system: System) -> None:
+    """Refuse systems that have no phase plane."""
+    check_system(system, "a phase plane", coordinates=1)
+    check_periodic(system)
+    for name, signal in system.load.channels.items():
+        if not isinstance(signal, Constant):
+            raise ParameterError(
+                f"load.{name} varies, so there is no phase plane; `basins` and `stable_manifold` are for loads that repeat",
+                f"load.{name}",
+            )
+
+
+def _pull(system: System, side: int) -> Callable[[float], float]:
+    """The acceleration at rest on a side, as a function of the coordinate."""
+    return lambda place: float(system.model.acceleration(0.0, place, 0.0, float(side), system.load))
+
+
+def _beside(system: System, side: int) -> float:
+    """A coordinate just inside a side."""
+    contact = float(system.model.contact)
+    return contact + (
+        EQUILIBRIA.inside if float(system.model.gap(contact + EQUILIBRIA.inside, side)) > 0.0 else -EQUILIBRIA.inside
+    )
+
+
+def _zeros(pull: Callable[[float], float], grid: np.ndarray) -> Iterator[float]:
+    """The zeros of the acceleration, at or between the points of a grid."""
+    from scipy.optimize import brentq
+
+    values = np.array([pull(place) for place in grid])
+    yield from (float(place) for place in grid[values == 0.0])
+    for i in np.flatnonzero(values[:-1] * values[1:] < 0.0):
+        yield float(brentq(pull, grid[i], grid[i + 1], xtol=1e-15, rtol=1e-15))
+
+
+def _eigenvalues(system: System, place: float, side: int) -> tuple[complex, complex]:
+    def pull(q: float, v: float) -> float:
+        return float(system.model.acceleration(0.0, q, v, float(side), system.load))
+
+    h = EQUILIBRIA.difference
+    slope = sum(w * (pull(place + j * h, 0.0) - pull(place - j * h, 0.0)) for j, w in SIXTH_ORDER) / h
+    loss = sum(w * (pull(place, j * h) - pull(place, -j * h)) for j, w in SIXTH_ORDER) / h
+    root = cmath.sqrt(0.25 * loss * loss + slope)
+    return 0.5 * loss + root, 0.5 * loss - root
+
+
+def _at_contact(system: System) -> list[Equilibrium]:
+    """The contact as an equilibrium: a stable one if all sides push towards it, an unstable one if both push away from it."""
+    contact, outward = float(system.model.contact), []
+    for side in system.model.sides:
+        place = _beside(system, side)
+        pull = _pull(system, side)
+        outward.append((pull(contact) or pull(place)) * (place - contact) > 0.0)
+    none = any(outward) and (len(outward) == 1 or not all(outward))
+    return [] if none else [Equilibrium(contact, 0, None, not any(outward))]
 
 
 @dataclass(frozen=True)
@@ -34,7 +183,7 @@ class SeparatrixSettings:
     span: float = 2.0  # The dimensionless time for which one call of `simulate` follows it.
 
 
-SETTINGS = SeparatrixSettings()
+SEPARATRICES = SeparatrixSettings()
 
 
 class SeparatrixEnd(StrEnum):
@@ -149,25 +298,25 @@ def _branch(
     assert saddle.eigenvalues is not None
     backward = reversed_system(system)
     span, step = times
-    theta, velocity = saddle.place + away * SETTINGS.offset, -away * SETTINGS.offset * saddle.eigenvalues[1].real
+    theta, velocity = saddle.place + away * SEPARATRICES.offset, -away * SEPARATRICES.offset * saddle.eigenvalues[1].real
     now, end, left = 0.0, SeparatrixEnd.SPAN, False
     parts: list[np.ndarray] = []
     impacts: list[np.ndarray] = []
     while now < span and end is SeparatrixEnd.SPAN:
         start: dict[str, Any] = {backward.model.coordinates[0]: theta, "velocity": velocity}
-        motion = simulate(backward, **start, duration=SETTINGS.span, tol=1e-13)
+        motion = simulate(backward, **start, duration=SEPARATRICES.span, tol=1e-13)
         part = _sampled(motion, now, step)
         apart = np.min(np.hypot(part[1] - saddles[:, None], part[2]), axis=0)
-        back = np.flatnonzero(apart < SETTINGS.close)
+        back = np.flatnonzero(apart < SEPARATRICES.close)
         if left and back.size:
             part, end = part[:, : back[0] + 1], SeparatrixEnd.SADDLE
         elif has_left(window, part[1:, -1:].T)[0]:
             end = SeparatrixEnd.WINDOW
-        left = left or bool(apart[-1] > 10.0 * SETTINGS.close)
+        left = left or bool(apart[-1] > 10.0 * SEPARATRICES.close)
         within = motion.impacts.time < part[0, -1] - now + step
         impacts.append(np.stack([now + motion.impacts.time, -motion.impacts.velocity_after], axis=1)[within])
         parts.append(part)
-        now, theta, velocity = now + SETTINGS.span, motion.position, motion.velocity
+        now, theta, velocity = now + SEPARATRICES.span, motion.position, motion.velocity
     time, thetas, velocities = np.concatenate(parts, axis=1)
     contacts = np.concatenate(impacts) * np.array([-1.0, 1.0])
     return Separatrix(system, saddle.place, -time, thetas, -velocities, contacts, end)
@@ -175,7 +324,7 @@ def _branch(
 
 def _sampled(motion: Motion, begin: float, step: float) -> np.ndarray:
     """Rows (time, coordinate, velocity) of a motion, with both sides of every impact, and nan between them where they differ."""
-    times = np.linspace(0.0, SETTINGS.span, round(SETTINGS.span / step) + 1)
+    times = np.linspace(0.0, SEPARATRICES.span, round(SEPARATRICES.span / step) + 1)
     theta, velocity = motion.at(times)
     impacts, contact = motion.impacts, float(motion.system.model.contact)
     rows = [np.stack([times, theta, velocity])]

@@ -49,21 +49,35 @@ class RecurrenceSettings:
 RECURRENCE = RecurrenceSettings()
 
 
-class Outcome(NumberedSentence):
-    """The outcome of a motion that was followed for some forcing periods."""
+class Ending(NumberedSentence):
+    """What a motion ends on, as far as it is known: the answer of simulations, verdicts, charts and diagrams alike.
 
-    MOVING = 0, "it goes on moving without repeating itself"
+    `str` gives the word, `sentence` the meaning.
+
+    Examples
+    --------
+    >>> saltus.classify(system, theta=0.3).kind is saltus.Ending.PERIODIC
+    True
+    """
+
+    UNDECIDED = 0, "it goes on moving without repeating itself, and no more is known"
     HELD = 1, "it is at rest at the contact, from where a later load may pull it"
     REST = 2, "it is at rest at the contact for all later loads"
     PERIODIC = 3, "it repeats itself"
     ENDED = 4, "it is ended by a margin of the model, or cannot go on"
+    QUASI_PERIODIC = 5, "it is on a torus: it does not repeat itself, and motions beside it stay there"
+    CHAOTIC = 6, "motions beside it part from it for good, and none of them settles"
+    TRANSIENT = 7, "it looks like chaos for a while, but motions beside it settle"
+
+    def __str__(self) -> str:
+        return self.name.lower().replace("_", "-")
 
 
 @dataclass(frozen=True, eq=False)
 class Recurrence:
     """The outcomes of many motions, one row for each; a state has the coordinates, then their velocities, d numbers in all."""
 
-    outcome: np.ndarray  # (n,): an `Outcome` for each
+    outcome: np.ndarray  # (n,): an `Ending` for each
     period: np.ndarray  # (n,): forcing periods after which the motion repeats itself; 0 if it does not
     periods: np.ndarray  # (n,): forcing periods for which it was followed
     last: np.ndarray  # (n, d): the state at the end
@@ -79,22 +93,22 @@ class Recurrence:
     @property
     def rest(self) -> np.ndarray:
         """Whether each motion is at rest at the contact for good, (n,)."""
-        return np.asarray(self.outcome == Outcome.REST)
+        return np.asarray(self.outcome == Ending.REST)
 
     @property
     def periodic(self) -> np.ndarray:
         """Whether each motion repeats itself, (n,)."""
-        return np.asarray(self.outcome == Outcome.PERIODIC)
+        return np.asarray(self.outcome == Ending.PERIODIC)
 
     @property
     def ended(self) -> np.ndarray:
         """Whether each motion was ended by a margin of the model, or cannot go on, (n,)."""
-        return np.asarray(self.outcome == Outcome.ENDED)
+        return np.asarray(self.outcome == Ending.ENDED)
 
     @property
     def unsettled(self) -> np.ndarray:
         """Whether each motion neither rests for good, nor repeats itself, nor has ended, (n,)."""
-        return np.asarray(self.outcome <= Outcome.HELD)
+        return np.asarray(self.outcome <= Ending.HELD)
 
     @property
     def within_period(self) -> np.ndarray:
@@ -280,7 +294,7 @@ def _read(result: EnsembleResult) -> Recurrence:
     assert result.periods is not None
     columns = {kind: samples[kind][:, :, 0] if kind in samples else None for kind in (Sample.IMPACT_COUNT, Sample.SPEED)}
     return Recurrence(
-        outcome=np.full(len(last), Outcome.MOVING, dtype=np.int8),
+        outcome=np.full(len(last), Ending.UNDECIDED, dtype=np.int8),
         period=np.zeros(len(last), dtype=int),
         periods=result.periods,
         last=last,
@@ -293,12 +307,12 @@ def _read(result: EnsembleResult) -> Recurrence:
 
 def _outcome(result: EnsembleResult, varied: bool) -> np.ndarray:
     """The outcomes that do not follow from a period."""
-    outcome = np.full(len(result.stops), Outcome.MOVING, dtype=np.int8)
+    outcome = np.full(len(result.stops), Ending.UNDECIDED, dtype=np.int8)
     held = result.held & result.stopped(Stop.HORIZON, Stop.REST)
     if held.any():
-        outcome[held] = Outcome.HELD if varied or not _rest_lasts(result.system) else Outcome.REST
-    outcome[result.stopped(Stop.CAPTURED)] = Outcome.REST
-    outcome[~result.stopped(Stop.HORIZON, Stop.REST, Stop.SETTLED, Stop.CAPTURED)] = Outcome.ENDED
+        outcome[held] = Ending.HELD if varied or not _rest_lasts(result.system) else Ending.REST
+    outcome[result.stopped(Stop.CAPTURED)] = Ending.REST
+    outcome[~result.stopped(Stop.HORIZON, Stop.REST, Stop.SETTLED, Stop.CAPTURED)] = Ending.ENDED
     return outcome
 
 
@@ -322,7 +336,7 @@ def _with_periods(found: Recurrence, compiled: Any, max_period: int, settings: R
         for row in np.flatnonzero(longer):
             period[row] = _long_period(found.states[row], max_period, settings)
     period[~found.unsettled] = 0
-    outcome[period > 0] = Outcome.PERIODIC
+    outcome[period > 0] = Ending.PERIODIC
     return replace(found, outcome=outcome, period=period)
 
 

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.checks import check_count
+from saltus.enumerations import flags
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import answered
 from saltus.studies.chart.added_motions import ADDED, has_motion, with_motions
 from saltus.studies.chart.border_curves import explained, passes_through
 from saltus.studies.chart.border_starts import border_starts, places
 from saltus.studies.chart.border_work import Workshop
-from saltus.studies.chart.cell_outcomes import flags
 from saltus.studies.chart.changes import Changes, ChartMotions, changes_of, keys_of, read_chart
 from saltus.studies.chart.endings import ChangeOutcome, ending_type
 from saltus.studies.chart.request import ChartRequest

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from saltus.attractors import Unsettled
 from saltus.enumerations import NumberedSentence
+from saltus.flow import Ending
 
 
 class CellOutcome(NumberedSentence):
@@ -20,19 +18,16 @@ class CellOutcome(NumberedSentence):
     MOTIONS_AND_CHAOS = 4, "chaos beside stable motions"
     LONG = 5, "a motion of a longer period than is looked for, or a slow one"
     UNDECIDED = 6, "motions of which it is not decided what they are"
-
-
-def flags(kind: type[NumberedSentence]) -> dict[str, Any]:
-    """The attributes that say what the numbers of a variable mean, after the CF conventions."""
-    return {"flag_values": [int(member) for member in kind], "flag_meanings": " ".join(member.name.lower() for member in kind)}
+    QUASI_PERIODIC = 7, "a quasi-periodic motion"
 
 
 def outcomes(count: np.ndarray, unsettled: np.ndarray, verdict: np.ndarray) -> np.ndarray:
     """The `CellOutcome` of cells, from their numbers of stable motions and of unsettled starts, and the verdict on the latter."""
     outcome = np.where(count > 1, CellOutcome.SEVERAL_MOTIONS, np.where(count == 1, CellOutcome.ONE_MOTION, CellOutcome.REST))
     open_ = unsettled > 0
-    chaotic = open_ & (verdict == Unsettled.CHAOTIC)
+    chaotic = open_ & (verdict == Ending.CHAOTIC)
     outcome[chaotic] = np.where(count[chaotic] > 0, CellOutcome.MOTIONS_AND_CHAOS, CellOutcome.CHAOS)
     left = open_ & ~chaotic & (count == 0)
-    outcome[left] = np.where(verdict[left] == Unsettled.PERIODIC, CellOutcome.LONG, CellOutcome.UNDECIDED)
+    shown = {Ending.PERIODIC: CellOutcome.LONG, Ending.QUASI_PERIODIC: CellOutcome.QUASI_PERIODIC}
+    outcome[left] = [shown.get(Ending(one), CellOutcome.UNDECIDED) for one in verdict[left]]
     return np.asarray(outcome)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.attractors import JudgementSettings, Unsettled, judge_unsettled
+from saltus.attractors import JudgementSettings, judge
+from saltus.flow import Ending
 from saltus.studies.chart.request import ChartRequest
 
 ASKED = 3  # motions of a cell that have not settled, from which the judgement starts at most
@@ -26,16 +27,16 @@ class CellVerdicts:
             there = first + i < last
             states[there, i] = motions["state"][(first + i)[there]]
         parameters = {path: values[self.cell] for path, values in request.parameters.items()}
-        found = judge_unsettled(request.system, states, parameters, settings=judgement(request.periods, request.tol))
-        self.verdict, self.exponent, self.error = found.verdict.copy(), found.exponent, found.error
+        found = judge(request.system, states, parameters, settings=judgement(request.periods, request.tol))
+        self.verdict, self.exponent, self.error = found.ending.copy(), found.exponent, found.error
         longer = np.unique(found.settled.question[found.settled.period > request.max_period])
         # A transient to an orbit of a longer period than the chart looks for leads to none of its motions.
-        self.verdict[longer[self.verdict[longer] == Unsettled.TRANSIENT]] = Unsettled.PERIODIC
+        self.verdict[longer[self.verdict[longer] == Ending.TRANSIENT]] = Ending.PERIODIC
         self.later = self.cell[found.settled.question], found.settled.state
 
         known = (found.period > 0) & (found.period <= request.max_period)
         # Such starts end on motions that the cell has through `later`, or come to rest.
-        self.settles = (self.verdict == Unsettled.TRANSIENT) | ((self.verdict == Unsettled.PERIODIC) & known)
+        self.settles = (self.verdict == Ending.TRANSIENT) | ((self.verdict == Ending.PERIODIC) & known)
 
 
 def judgement(periods: int, tol: float) -> JudgementSettings:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow import Outcome, Recurrence, approached, find_recurrence
+from saltus.flow import Ending, Recurrence, approached, find_recurrence
 from saltus.orbits import initial_states, rest_state, states_beside
 from saltus.studies.chart.cell_outcomes import outcomes
 from saltus.studies.chart.cell_verdicts import CellVerdicts
@@ -151,9 +151,9 @@ def settle(request: ChartRequest, cell: np.ndarray, states: np.ndarray, known: n
             left.append(moving[many])
             moving = moving[~many]
         moving, outcome, fading = _followed(request, moving, math.ceil(share * request.periods))
-        _count(ended, moving[outcome == Outcome.ENDED])
-        moving, outcome, fading = (values[outcome != Outcome.ENDED] for values in (moving, outcome, fading))
-        rests = outcome == Outcome.REST
+        _count(ended, moving[outcome == Ending.ENDED])
+        moving, outcome, fading = (values[outcome != Ending.ENDED] for values in (moving, outcome, fading))
+        rests = outcome == Ending.REST
         _count(captured, moving[rests])
         settled = moving["period"] > 0
         # Until a motion of the cell has come to rest, fading motions are followed, to show that there is rest.
@@ -177,7 +177,7 @@ def _count(number: np.ndarray, motions: np.ndarray) -> None:
 
 
 def _followed(request: ChartRequest, motions: np.ndarray, periods: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The motions some forcing periods later, with the period of those that have settled; the `Outcome` of each; the amplitudes
+    """The motions some forcing periods later, with the period of those that have settled; the `Ending` of each; the amplitudes
     as `_fading` gives them.
 
     The state of a motion that is about to settle is replaced by its extrapolated limit.

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.attractors import Unsettled
 from saltus.checks import (
     check_along,
     check_axis,
@@ -21,10 +20,11 @@ from saltus.checks import (
     check_starts,
     check_work,
 )
+from saltus.enumerations import flags
 from saltus.errors import ParameterError, shown
-from saltus.flow import state_names
+from saltus.flow import Ending, state_names
 from saltus.provenance import check_provenance, identity, provenance
-from saltus.studies.chart.cell_outcomes import CellOutcome, flags
+from saltus.studies.chart.cell_outcomes import CellOutcome
 from saltus.studies.chart.motions import KEPT
 from saltus.systems import System, check_system
 from saltus.theory import amplitude_limits
@@ -192,7 +192,7 @@ class ChartRequest:
             rows.append(("motion_slowest", "f8", unit, each, "least speed of an impact of each motion, 0 without impacts"))
         limits = amplitude_limits(self.system)
         rows += [(f"beyond_{limit.name}", "?", "1", (), f"the largest motion passes {limit.meaning}") for limit in limits]
-        meanings = {"outcome": flags(CellOutcome), "verdict": flags(Unsettled)}
+        meanings = {"outcome": flags(CellOutcome), "verdict": flags(Ending)}
         return {
             key: Variable(dtype=dtype, extra=extra, attrs={"units": units, "long_name": text} | meanings.get(key, {}))
             for key, dtype, units, extra, text in rows

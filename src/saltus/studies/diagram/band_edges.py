@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from saltus.attractors import Unsettled
-from saltus.flow import Motion, find_recurrence
+from saltus.flow import Ending, Motion, find_recurrence
 from saltus.orbits import Branch, PeriodicOrbit, SpecialKind, SpecialPoint, is_symmetric
 from saltus.studies.diagram.bands import Band, Bands, Edge, EdgeKind
 from saltus.studies.diagram.chaos_search import BandOrigin
@@ -66,13 +65,13 @@ class _Evidence:
         special, kind = self._special(edge)
         if special is not None:
             return replace(edge, kind=kind, special=special.parameter)
-        if self._verdict(edge.outer) is not Unsettled.TRANSIENT:
+        if self._verdict(edge.outer) is not Ending.TRANSIENT:
             return edge
         distance = self._touched(band, edge)
         return replace(edge, distance=distance, kind=EdgeKind.CRISIS if distance <= SETTINGS.touch else edge.kind)
 
-    def _verdict(self, value: float) -> Unsettled:
-        return Unsettled(self.chaos.tried.verdict[np.searchsorted(self.chaos.tried.values, value)])
+    def _verdict(self, value: float) -> Ending:
+        return Ending(self.chaos.tried.verdict[np.searchsorted(self.chaos.tried.values, value)])
 
     def _special(self, edge: Edge) -> tuple[SpecialPoint | None, EdgeKind]:
         """The special point that shows what happens at an edge, or None, and the kind of edge that it makes."""
@@ -98,7 +97,7 @@ class _Evidence:
         tried, first = self.chaos.tried, int(np.searchsorted(self.chaos.tried.values, edge.outer))
         step = 1 if edge.outer > edge.inner else -1
         nearest = [i for i in range(first, first + SETTINGS.nearest * step, step) if 0 <= i < len(tried.values)]
-        return next((int(tried.period[i]) for i in nearest if tried.verdict[i] == Unsettled.PERIODIC and tried.period[i] > 0), 0)
+        return next((int(tried.period[i]) for i in nearest if tried.verdict[i] == Ending.PERIODIC and tried.period[i] > 0), 0)
 
     def _touched(self, band: Band, edge: Edge) -> float:
         """The attractor's distance to the unstable orbit that it touches at an edge but not inside the band; nan if there is

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.attractors import Unsettled
+from saltus.enumerations import flags
+from saltus.flow import Ending
 from saltus.provenance import provenance
 from saltus.result import Result
 from saltus.studies.diagram.simulated import SimulatedMotions
@@ -43,7 +44,7 @@ class Tried:
     """What became of motions at all values that were tried, in rising order."""
 
     values: np.ndarray  # (n,)
-    verdict: np.ndarray  # (n,): an `Unsettled`; PERIODIC also where all motions settle or rest
+    verdict: np.ndarray  # (n,): an `Ending`; PERIODIC also where all motions settle or rest
     exponent: np.ndarray  # (n,): largest Lyapunov exponent of the motions that have not settled, else nan
     error: np.ndarray  # (n,): half width of its 95 % interval
     life: np.ndarray  # (n,): mean life of a transient in forcing periods; of chaos the mean life that is excluded with 95 %
@@ -53,12 +54,12 @@ class Tried:
     @property
     def chaotic(self) -> np.ndarray:
         """At which values a motion is chaotic, (n,)."""
-        return np.asarray(self.verdict == Unsettled.CHAOTIC)
+        return np.asarray(self.verdict == Ending.CHAOTIC)
 
     @property
     def undecided(self) -> np.ndarray:
-        """At which values a motion is neither regular, nor a transient, nor shown to be chaotic, (n,)."""
-        return np.asarray(self.verdict == Unsettled.UNDECIDED)
+        """At which values it is not decided what a motion ends on, (n,)."""
+        return np.asarray(self.verdict == Ending.UNDECIDED)
 
 
 @dataclass(frozen=True)
@@ -123,12 +124,11 @@ class Bands(Result):
     def _exponents(self) -> xarray.Dataset:
         import xarray
 
-        tried, settled = self.tried, ["undecided", "chaotic", "transient", "regular"]
-        flags = {"flag_values": np.arange(len(settled), dtype=np.int8), "flag_meanings": " ".join(settled)}
+        tried = self.tried
         columns = {
             "exponent": ("value", tried.exponent, {"long_name": "largest Lyapunov exponent of motions that have not settled"}),
             "error": ("value", tried.error, {"long_name": "half width of its 95 % interval"}),
-            "verdict": ("value", tried.verdict.astype(np.int8), flags),
+            "verdict": ("value", tried.verdict.astype(np.int8), flags(Ending)),
             "life": (
                 "value",
                 tried.life,

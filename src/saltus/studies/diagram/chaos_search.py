@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from saltus.attractors import Earlier, Unsettled
+from saltus.attractors import EarlierJudgement
 from saltus.checks import check_count
+from saltus.flow import Ending
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import checked_by
 from saltus.studies.checks import check_diagram
@@ -71,7 +72,7 @@ def chaotic_bands(
 
     Where the motions at two neighbouring values differ, or are chaotic at one of them, the interval is halved, down to a
     thousandth of the range. Motions at the new value begin on those at both ends, so that an attractor is followed however small
-    its basin is. Motions that have not settled after 300 forcing periods are judged by `judge_unsettled`. The edges of bands, and
+    its basin is. Motions that have not settled after 300 forcing periods are judged by `judge`. The edges of bands, and
     of windows of periodic motion within them, are then enclosed in brackets of 1e-4 of the range, by motions begun on the chaos
     of the inner side. Windows narrower than a thousandth of the range are found by chance only; an attractor is not found if its
     basin contains no start and it ends before the next value. `effort="quick"` halves to 4e-3 and 1e-3 of the range and judges
@@ -210,7 +211,7 @@ class BandSearch(SearchedRange):
     def _is_of_interest(self, a: SearchedValue, b: SearchedValue) -> bool:
         """Whether chaos may begin, end or be interrupted between two neighbouring values that are not close to each other yet."""
         width = (b.value - a.value) / self.span
-        if a.verdict is b.verdict is Unsettled.UNDECIDED:
+        if {a.verdict, b.verdict} <= {Ending.UNDECIDED, Ending.QUASI_PERIODIC}:
             width /= self.settings.undecided
         if a.chaotic != b.chaotic:
             return width > self.settings.edge
@@ -242,7 +243,7 @@ class BandSearch(SearchedRange):
         If the motions without chaos are transients, it is the least care that excludes mean lives `longer` times as long as
         theirs.
         """
-        life = self.settings.longer * other.life if other.verdict is Unsettled.TRANSIENT else 0.0
+        life = self.settings.longer * other.life if other.verdict is Ending.TRANSIENT else 0.0
         judgements = self.settings.judgements
         return next((care for care, one in enumerate(judgements) if one.exposure >= 3.0 * life), len(judgements) - 1)
 
@@ -302,7 +303,7 @@ class BandSearch(SearchedRange):
                 asked.setdefault((care, len(place.chaos)), []).append(place)
         questions = []
         for (care, _), alike in asked.items():
-            known = Earlier(*np.array([(place.exponent, place.error, place.quiet) for place in alike]).T)
+            known = EarlierJudgement(*np.array([(place.exponent, place.error, place.quiet) for place in alike]).T)
             states = np.stack([place.chaos for place in alike])
             questions.append(Question(np.array([place.value for place in alike]), states, care, known))
         self._judge(questions)

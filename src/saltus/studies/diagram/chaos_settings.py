@@ -37,7 +37,7 @@ class ChaosSettings:
     judgements: tuple[JudgementSettings, ...] = (
         replace(JUDGEMENT, companions=8, exposure=2000, round_periods=500, rounds=2),
         replace(JUDGEMENT, companions=12, exposure=20_000, round_periods=1500),
-        replace(JUDGEMENT, exposure=100_000, round_periods=1690),
+        JUDGEMENT,
     )
     # The values of a band within this share of the range are judged together, by the sum of the forcing periods in which none of
     # their motions has settled.

@@ -96,7 +96,7 @@ def bifurcation_diagram(
 
     Motions are simulated from states spread over a window at many values of the parameter, then from the motions at neighbouring
     values, until nothing new is found. The orbits on which they settle are followed, unless a branch goes through them already;
-    motions that do not settle are judged by `judge_unsettled`. Unstable orbits of up to `repelling` forcing periods, and the
+    motions that do not settle are judged by `judge`. Unstable orbits of up to `repelling` forcing periods, and the
     families that are born at every PD and BPC, are followed as well; families of more than one forcing period also above the
     upper bound, where many of them close. At last random motions estimate the share of the states that end on something that the
     diagram lacks, and the orbits on which they settle are followed too. Every orbit is confirmed by the event-driven flow over a

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.attractors import JUDGEMENT, Earlier, Judged, JudgementSettings, SettledLater, judge_unsettled
-from saltus.flow import Outcome
+from saltus.attractors import JUDGEMENT, EarlierJudgement, Judged, JudgementSettings, SettledLater, judge
+from saltus.flow import Ending
 from saltus.orbits import (
     Branch,
     PeriodicOrbit,
@@ -49,9 +49,19 @@ NUMBERS = (
     "lowest",
     "slowest",
 )  # the first entries of a motion's row, before its states
-JUDGED = ("verdict", "doubt", "exponent", "error", "gone", "life", "period")  # the first entries of a judgement's row
-EARLIER = tuple(part.name for part in fields(Earlier))
-WHOLE = (*NUMBERS[1:4], "verdict", "doubt", "gone")  # the entries that are whole numbers
+JUDGED = (
+    "ending",
+    "reason",
+    "exponent",
+    "error",
+    "resolution",
+    "zero_one",
+    "gone",
+    "life",
+    "period",
+)  # the first entries of a judgement's row
+EARLIER = tuple(part.name for part in fields(EarlierJudgement))
+WHOLE = (*NUMBERS[1:4], "ending", "reason", "gone")  # the entries that are whole numbers
 COMPANIONS = JUDGEMENT.companions  # the most states that are kept of a judgement
 SETTLED, ALIKE = 32, 4  # the most settled motions that are kept of a judgement, and the most of one period
 BRANCH_BYTES = 1 << 20  # the most bytes of a branch: one of 200 points has 12 000
@@ -122,13 +132,13 @@ class DiagramWork:
         return given if end <= periods else periods
 
     def _note(self, given: list[float], row: np.ndarray) -> None:
-        if row[1] in (Outcome.REST, Outcome.PERIODIC, Outcome.ENDED):
+        if row[1] in (Ending.REST, Ending.PERIODIC, Ending.ENDED):
             self.ended.setdefault(tuple(given[:-1]), (int(given[-1]), float(row[0])))
 
     def judge(
-        self, values: np.ndarray, states: np.ndarray, settings: JudgementSettings, earlier: Earlier | None = None
+        self, values: np.ndarray, states: np.ndarray, settings: JudgementSettings, earlier: EarlierJudgement | None = None
     ) -> Judged:
-        """`judge_unsettled` of states (n, m, d) at values (n,) of the parameter."""
+        """`judge` of states (n, m, d) at values (n,) of the parameter."""
         if self.parts is None:
             return self._judge(values, states, settings, earlier, silent)
         numbers = asdict(settings)
@@ -140,12 +150,19 @@ class DiagramWork:
         return _judged(np.array(self.parts.rows(self._kinds["judgements"], inputs)), settings.companions, self.system.dimension)
 
     def _judge(
-        self, values: np.ndarray, states: np.ndarray, settings: JudgementSettings, earlier: Earlier | None, progress: Progress
+        self,
+        values: np.ndarray,
+        states: np.ndarray,
+        settings: JudgementSettings,
+        earlier: EarlierJudgement | None,
+        progress: Progress,
     ) -> Judged:
-        found = judge_unsettled(self.system, states, {self.path: values}, settings=settings, earlier=earlier, progress=progress)
+        found = judge(self.system, states, {self.path: values}, settings=settings, earlier=earlier, progress=progress)
         return replace(found, settled=found.settled.few(ALIKE, SETTLED))
 
-    def judge_all(self, questions: Sequence[tuple[np.ndarray, np.ndarray, JudgementSettings, Earlier | None]]) -> list[Judged]:
+    def judge_all(
+        self, questions: Sequence[tuple[np.ndarray, np.ndarray, JudgementSettings, EarlierJudgement | None]]
+    ) -> list[Judged]:
         """`judge` several times: all at once, or one after the other if results are kept or other processes compute."""
         if self.parts is not None:
             return [self.judge(*question) for question in questions]
@@ -286,9 +303,9 @@ def judgements(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[s
     states = np.full((len(inputs), max(len(given["states"]) for given in inputs), d), np.nan)
     for to_fill, given in zip(states, inputs, strict=True):
         to_fill[: len(given["states"])] = given["states"]
-    earlier = Earlier(*np.array([given["earlier"] for given in inputs]).T) if "earlier" in inputs[0] else None
+    earlier = EarlierJudgement(*np.array([given["earlier"] for given in inputs]).T) if "earlier" in inputs[0] else None
     values = np.array([given["value"] for given in inputs])
-    found = judge_unsettled(system, states, {arguments["path"]: values}, settings=settings, earlier=earlier)
+    found = judge(system, states, {arguments["path"]: values}, settings=settings, earlier=earlier)
     n, later = len(JUDGED), found.settled.few(ALIKE, SETTLED)
     result[:, :n] = np.stack([getattr(found, name) for name in JUDGED], axis=1)
     result[:, n : n + d * settings.companions] = found.states.reshape(len(inputs), -1)

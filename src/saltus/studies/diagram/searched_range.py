@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from saltus.attractors import Earlier
+from saltus.attractors import EarlierJudgement
 from saltus.studies.diagram.bands import Bands, Tried, bands_of
 from saltus.studies.diagram.chaos_settings import SETTINGS, ChaosSettings
 from saltus.studies.diagram.diagram_work import DiagramWork
@@ -33,7 +33,7 @@ class Question(NamedTuple):
     values: np.ndarray
     states: np.ndarray
     care: int
-    earlier: Earlier | None = None
+    earlier: EarlierJudgement | None = None
 
 
 @dataclass

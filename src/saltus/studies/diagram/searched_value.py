@@ -6,9 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from saltus.attractors import Judged, Unsettled
+from saltus.attractors import Judged
+from saltus.flow import Ending
 
-RANKS = (Unsettled.PERIODIC, Unsettled.TRANSIENT, Unsettled.UNDECIDED, Unsettled.CHAOTIC)  # of several verdicts, the last counts
+# Of several verdicts, the last one counts.
+RANKS = (Ending.PERIODIC, Ending.QUASI_PERIODIC, Ending.TRANSIENT, Ending.UNDECIDED, Ending.CHAOTIC)
 
 
 @dataclass(order=True)
@@ -16,7 +18,7 @@ class SearchedValue:
     """What is known at one value of the parameter."""
 
     value: float
-    verdict: Unsettled = field(default=Unsettled.PERIODIC, compare=False)  # until a motion is judged, all are taken to settle
+    verdict: Ending = field(default=Ending.PERIODIC, compare=False)  # until a motion is judged, all are taken to settle
     exponent: float = field(default=np.nan, compare=False)
     error: float = field(default=np.nan, compare=False)
     life: float = field(default=np.nan, compare=False)
@@ -31,7 +33,7 @@ class SearchedValue:
     @property
     def chaotic(self) -> bool:
         """Whether there is chaos."""
-        return self.verdict is Unsettled.CHAOTIC
+        return self.verdict is Ending.CHAOTIC
 
     @property
     def quiet(self) -> float:
@@ -45,10 +47,10 @@ class SearchedValue:
 
     @property
     def goes_on(self) -> bool:
-        """Whether motions here are chaotic or may be so, or have a longer period than all motions that have settled."""
-        if self.verdict is Unsettled.PERIODIC:
+        """Whether motions here are chaotic or may be so, are on a torus, or have a longer period than those that have settled."""
+        if self.verdict is Ending.PERIODIC:
             return self.period > self.longest_orbit
-        return self.verdict in (Unsettled.CHAOTIC, Unsettled.UNDECIDED)
+        return self.verdict is not Ending.TRANSIENT
 
     @property
     def longest(self) -> int:
@@ -58,7 +60,7 @@ class SearchedValue:
     def judge(self, judged: Judged, row: int, care: int) -> None:
         """Take the verdict on the unsettled motions here, unless an earlier judgement was more careful, or as careful and found a
         verdict of higher rank."""
-        verdict = Unsettled(judged.verdict[row])
+        verdict = Ending(judged.ending[row])
         if care < self.care or (care == self.care and RANKS.index(verdict) < RANKS.index(self.verdict)):
             return
         self.verdict, self.care, self.chaos = verdict, care, judged.states[row]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow import Outcome, Recurrence, find_recurrence, return_distances
+from saltus.flow import Ending, Recurrence, find_recurrence, return_distances
 from saltus.orbits import even_steps, is_still, within_window
 from saltus.progress import Progress, silent
 from saltus.systems import System
@@ -46,7 +46,7 @@ class SimulatedMotions:
     value: np.ndarray  # (n,) of the parameter
     periods: np.ndarray  # (n,): forcing periods for which it was followed the last time
     last: np.ndarray  # (n, d): coordinates and velocities at the end, at phase 0
-    outcome: np.ndarray  # (n,): an `Outcome`
+    outcome: np.ndarray  # (n,): an `Ending`
     period: np.ndarray  # (n,): forcing periods after which it repeats itself; 0 where it does not
     impact_count: np.ndarray  # (n,): impacts in one period or, if it has none, in the forcing periods that are kept
     highest: np.ndarray  # (n,): largest coordinate over its period, or over the forcing periods that are kept
@@ -71,17 +71,17 @@ class SimulatedMotions:
     @property
     def unsettled(self) -> np.ndarray:
         """Which neither rest, nor repeat themselves, nor have ended: chaotic, slow, or of a period above 16, (n,)."""
-        return np.asarray(self.outcome == Outcome.MOVING)
+        return np.asarray(self.outcome == Ending.UNDECIDED)
 
     @property
     def ended(self) -> np.ndarray:
         """Which a limit of the model has ended, (n,)."""
-        return np.asarray(self.outcome == Outcome.ENDED)
+        return np.asarray(self.outcome == Ending.ENDED)
 
     @property
     def at_rest(self) -> np.ndarray:
         """Which are at rest at the contact, (n,)."""
-        return np.asarray((self.outcome == Outcome.REST) | (self.outcome == Outcome.HELD))
+        return np.asarray((self.outcome == Ending.REST) | (self.outcome == Ending.HELD))
 
     def only(self, rows: Any) -> SimulatedMotions:
         """Some of the motions."""
@@ -167,8 +167,8 @@ def _motions(system: System, values: np.ndarray, ends: Recurrence) -> SimulatedM
     assert ends.extrema is not None
     highest, lowest = ends.highest, ends.lowest
     period, outcome = ends.period.copy(), ends.outcome.copy()
-    still = is_still(system, highest, lowest, SETTINGS.still) & ((period > 0) | (outcome == Outcome.MOVING))
-    outcome[still], period[still] = Outcome.HELD, 0
+    still = is_still(system, highest, lowest, SETTINGS.still) & ((period > 0) | (outcome == Ending.UNDECIDED))
+    outcome[still], period[still] = Ending.HELD, 0
     shown = ends.within_period & ~ends.rest[:, None]
     return SimulatedMotions(
         value=np.array(values, dtype=float),

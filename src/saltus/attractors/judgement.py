@@ -1,6 +1,6 @@
-"""The judgement of motions that have not settled: chaos, a transient, or a periodic motion of long period; many at once.
+"""The judge: what motions end on that have not settled, many at once.
 
-Charts and diagrams both use it, so that they cannot contradict each other.
+`classify`, `find_attractors`, charts and diagrams all ask it, so that they cannot contradict each other on one motion.
 """
 
 from __future__ import annotations
@@ -11,31 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from saltus.attractors.lyapunov.largest_exponent import LargestExponents
-from saltus.enumerations import NumberedSentence
-from saltus.flow import RECURRENCE, Outcome, Recurrence, find_recurrence, return_period
+from saltus.attractors.lyapunov.growth import LargestExponents
+from saltus.attractors.reason import Reason
+from saltus.attractors.tori import regular_motion
+from saltus.flow import RECURRENCE, Ending, Recurrence, find_recurrence, return_period
 from saltus.orbits import states_beside
 from saltus.progress import Progress, part_of, silent
 from saltus.systems import System
-
-
-class Unsettled(NumberedSentence):
-    """What motions are that have neither come to rest nor repeated themselves so far."""
-
-    UNDECIDED = 0, "the numbers do not bear out a verdict"
-    CHAOTIC = 1, "neighbouring motions part for good, and none of them settles"
-    TRANSIENT = 2, "motions from the same states settle after a while"
-    PERIODIC = 3, "neighbouring motions come together: it settles slowly, or on an orbit of a long period"
-
-
-class Doubt(NumberedSentence):
-    """Why no verdict is borne out."""
-
-    NONE = 0, "there is a verdict"
-    NEAR_ZERO = 1, "the largest exponent is not surely above or below 0"
-    FEW_SETTLED = 2, "some motions settled, too few to tell a long transient from chaos beside one"
-    NO_EXPONENT = 3, "the motions rest or end before an exponent is known"
-    LIMIT = 4, "a limit of the model ends all motions"
 
 
 @dataclass(frozen=True)
@@ -45,11 +27,11 @@ class JudgementSettings:
     # Number of companions: motions from the states of a question, which stand for all motions there.
     companions: int = 16
     first_periods: int = 250  # The first round in forcing periods; most transients end in it, and need no exponents.
-    round_periods: int = 1625  # The length of each further round. After a round survivors replace the companions that settled.
+    round_periods: int = 1690  # The length of each further round. After a round survivors replace the companions that settled.
     rounds: int = 12  # The largest number of further rounds.
     # Forcing periods, added up over companions, in which none may settle. If none has settled within E, transients of a mean life
     # of E / 3 or less are excluded with a probability of 95 %, as the number that settle within E is Poisson distributed.
-    exposure: int = 30_000
+    exposure: int = 100_000
     # Number of companions that must have settled for the verdict of a transient while others go on: from three, a mean life is
     # estimated to within a factor of about 3. If some settle and then no more do, chaos takes a time without settling of three of
     # the mean lives that the former show.
@@ -79,7 +61,7 @@ JUDGEMENT = JudgementSettings()
 
 
 @dataclass(frozen=True, eq=False)
-class Earlier:
+class EarlierJudgement:
     """What a less careful judgement has shown of the chaos from whose states a further one starts, an entry for each question."""
 
     exponent: np.ndarray  # (n,): the largest exponent, which is surely above 0
@@ -91,10 +73,12 @@ class Earlier:
 class Judged:
     """The answers, an entry for each question."""
 
-    verdict: np.ndarray  # (n,): an `Unsettled` each
-    doubt: np.ndarray  # (n,): a `Doubt` each
+    ending: np.ndarray  # (n,): an `Ending`: CHAOTIC, TRANSIENT, PERIODIC, QUASI_PERIODIC or UNDECIDED
+    reason: np.ndarray  # (n,): a `Reason`, whose sentence `sentence` fills in
     exponent: np.ndarray  # (n,): largest exponent of those that have not settled, per unit of time; nan if all settle at once
     error: np.ndarray  # (n,): half width of its 95 % interval
+    resolution: np.ndarray  # (n,): 2 ln(t) / t, which regular motion may show after the time of the run
+    zero_one: np.ndarray  # (n,): K of the 0-1 test by which a torus is one; else nan
     gone: np.ndarray  # (n,): how many companions have settled, or were ended by a limit of the model
     life: np.ndarray  # (n,): mean life of a transient in forcing periods; of chaos the mean life that is excluded with 95 %
     period: np.ndarray  # (n,): forcing periods after which a periodic motion repeats itself, 0 if that is not known
@@ -102,7 +86,20 @@ class Judged:
     settled: SettledLater  # what companions settled on
 
     def __len__(self) -> int:
-        return len(self.verdict)
+        return len(self.ending)
+
+    def sentence(self, row: int, settings: JudgementSettings, torus: str = "") -> str:
+        """The reason of an answer in words; `torus` is added where it is not known whether a motion is regular."""
+        exponent, error, least = (float(values[row]) for values in (self.exponent, self.error, self.resolution))
+        seen = f"its largest exponent is {exponent:.4g} +- {error:.1g}, where regular motion may show {least:.1g}"
+        numbers = {"gone": int(self.gone[row]), "life": float(self.life[row]), "period": int(self.period[row])}
+        return Reason(self.reason[row]).sentence.format(
+            seen=seen if np.isfinite(exponent) else "it looks like chaos for a while",
+            torus=torus,
+            longest=settings.longest_period,
+            K=float(self.zero_one[row]),
+            **numbers,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,16 +127,16 @@ class SettledLater:
         return SettledLater(self.question[order], self.state[order], self.period[order])
 
 
-def judge_unsettled(
+def judge(
     system: System,
     states: np.ndarray,
     parameters: Mapping[str, np.ndarray],
     *,
     settings: JudgementSettings = JUDGEMENT,
-    earlier: Earlier | None = None,
+    earlier: EarlierJudgement | None = None,
     progress: Progress = silent,
 ) -> Judged:
-    """Whether motions that have not settled are chaotic, transient, or periodic after all.
+    """What motions end on that have not settled: chaos, a transient, a torus, or an orbit after all.
 
     A question is a set of stroboscopic states under one set of parameters: the last states of a motion, or of several motions,
     that have not settled. Companions start at these and are followed in rounds. Chaos takes two conditions. The average of the
@@ -148,6 +145,9 @@ def judge_unsettled(
     estimated or bounded by this number. If some settle, survivors take their places; if there is a chaotic attractor beside the
     transient, the share of companions on it grows, until none settles within three mean lives of the transient. If the rate at
     which companions settle does not fall, there is no such attractor.
+
+    A motion is periodic if its exponent is surely below 0, or if it is found to repeat itself after a long period. It is on a
+    torus if its exponent may be 0 and the conditions of `regular_motion` hold.
 
     Parameters
     ----------
@@ -165,67 +165,46 @@ def judge_unsettled(
     progress
         Called with the fraction done.
     """
-    run = _Judgement.begin(system, states, parameters, settings)
+    run = _Judgement(system, states, parameters, settings)
     if earlier is None:
         run.follow(settings.first_periods, part_of(progress, 0.0, 0.2, "judging"))
         run.measure()
     else:
-        run.take(earlier)
+        run.go_on_from(earlier)
     for i in range(settings.rounds):
         open_chaos = run.positive & ~run.lasts & ~run.steady & run.may_last(settings.rounds - i)
         run.open &= open_chaos | (~run.positive & ~run.negative & (run.gone > 0))
-        run.follow(settings.round_periods, part_of(progress, 0.3 + 0.7 * i / settings.rounds, 1.0, "judging"))
+        run.follow(settings.round_periods, part_of(progress, *(0.3 + 0.7 * n / settings.rounds for n in (i, i + 1)), "judging"))
     run.look_for_long_periods(~run.all_gone)
+    run.look_for_tori()
     progress(1.0, "judging")
     return run.judged()
 
 
-@dataclass(eq=False)
 class _Judgement:
     """The state of a judgement of several questions."""
 
-    system: System
-    parameters: dict[str, np.ndarray]
-    settings: JudgementSettings
-    states: np.ndarray  # (n, companions, d)
-    open: np.ndarray  # (n,): whether companions are still to be followed
-    positive: np.ndarray  # (n,): whether the exponent is surely above 0
-    negative: np.ndarray  # (n,): whether it is surely below 0
-    exponent: np.ndarray
-    error: np.ndarray
-    period: np.ndarray
-    gone: np.ndarray  # (n,): number of companions that have settled, or have ended
-    ended: np.ndarray  # (n,): number of companions among these that a limit of the model has ended
-    exposure: np.ndarray  # (n,): forcing periods for which companions were followed, added up
-    rounds: np.ndarray  # (n,): number of rounds
-    history: np.ndarray  # (2, rounds, n): number of companions that settled in each round, and the round's exposure
-    before: np.ndarray  # (n,): the exposure up to the end of the last round in which any settled
-    all_gone: np.ndarray  # (n,): whether no companion is left
-    looked: np.ndarray  # (n,): whether a long period was looked for
-    settled: SettledLater
-
-    @classmethod
-    def begin(
-        cls, system: System, states: np.ndarray, parameters: Mapping[str, np.ndarray], settings: JudgementSettings
-    ) -> _Judgement:
-        """Companions at the states of each question."""
+    def __init__(
+        self, system: System, states: np.ndarray, parameters: Mapping[str, np.ndarray], settings: JudgementSettings
+    ) -> None:
         n = len(states)
-        chosen = np.full((n, settings.companions, system.dimension), np.nan)
+        self.system, self.settings, self.settled = system, settings, SettledLater.none(system.dimension)
+        self.parameters = {path: np.broadcast_to(np.asarray(values, dtype=float), n) for path, values in parameters.items()}
+        self.states = np.full((n, settings.companions, system.dimension), np.nan)
         for row, given in enumerate(states):
-            chosen[row] = _companions(system, given[np.isfinite(given).all(axis=-1)], settings)
-        columns = {path: np.broadcast_to(np.asarray(values, dtype=float), n) for path, values in parameters.items()}
-        flags = (np.zeros(n, dtype=bool) for _ in range(4))
-        zeros = (np.zeros(n, dtype=int) for _ in range(6))
-        positive, negative, all_gone, looked = flags
-        period, gone, ended, exposure, rounds, before = zeros
-        history = np.zeros((2, settings.rounds + 1, n))
-        empty = np.full((2, n), np.nan)
-        return cls(
-            system, columns, settings, chosen, np.ones(n, dtype=bool), positive, negative, empty[0], empty[1],
-            period, gone, ended, exposure, rounds, history, before, all_gone, looked, SettledLater.none(system.dimension),
-        )  # fmt: skip
+            self.states[row] = _companions(system, given[np.isfinite(given).all(axis=-1)], settings)
+        self.open = np.ones(n, dtype=bool)  # whether companions are still to be followed
+        self.positive, self.negative = np.zeros((2, n), dtype=bool)  # whether the exponent is surely above, or below 0
+        self.all_gone, self.looked = np.zeros((2, n), dtype=bool)  # whether no companion is left; whether long periods were tried
+        self.exponent, self.error, self.resolution, self.zero_one = np.full((4, n), np.nan)
+        self.gone, self.ended = np.zeros((2, n), dtype=int)  # companions that have settled or ended; of these, by a limit
+        self.exposure = np.zeros(n, dtype=int)  # forcing periods for which companions were followed, added up
+        self.before = np.zeros(n, dtype=int)  # the exposure up to the end of the last round in which any settled
+        self.period, self.rounds = np.zeros((2, n), dtype=int)
+        # Number of companions that settled in each round, and the round's exposure.
+        self.history = np.zeros((2, settings.rounds + 1, n))
 
-    def take(self, earlier: Earlier) -> None:
+    def go_on_from(self, earlier: EarlierJudgement) -> None:
         """Go on from what a less careful judgement has shown."""
         self.exponent, self.error, self.exposure = earlier.exponent.copy(), earlier.error.copy(), earlier.quiet.astype(int)
         self.positive[:] = True
@@ -251,7 +230,7 @@ class _Judgement:
             return
         ends = self._ends(rows, self.states[rows], periods, progress)
         shape = (rows.size, self.settings.companions)
-        moving, last = (ends.outcome == Outcome.MOVING).reshape(shape), ends.last.reshape(*shape, -1)
+        moving, last = (ends.outcome == Ending.UNDECIDED).reshape(shape), ends.last.reshape(*shape, -1)
         self._keep_settled(rows, ends)
         left, followed = (~moving).sum(axis=1), np.ceil(ends.periods).astype(int).reshape(shape).sum(axis=1)
         self.history[:, self.rounds[rows], rows] = left, followed
@@ -314,7 +293,7 @@ class _Judgement:
             if not asked.size:
                 return
             run.go_on(asked, periods)
-            for name in ("exponent", "error", "positive", "negative"):
+            for name in ("exponent", "error", "resolution", "positive", "negative"):
                 getattr(self, name)[rows] = getattr(run.found, name)
             if periods >= settings.regular_run:
                 self.look_for_long_periods(self.open & (self.exponent < 0.0))
@@ -336,22 +315,42 @@ class _Judgement:
         self.period[rows] = fewest
         self.settled = self.settled.joined(SettledLater(rows, ends.last, fewest))
 
+    def look_for_tori(self) -> None:
+        """Decide whether a motion of each question whose exponent may be 0 is on a torus, or approaches an orbit slowly."""
+        chosen = ~self.positive & ~self.negative & (self.period == 0) & ~self.all_gone & np.isfinite(self.exponent)
+        for row in np.flatnonzero(chosen):
+            system = self.system.with_({path: float(values[row]) for path, values in self.parameters.items()})
+            found = regular_motion(system, self.states[row, 0], self.settings.patience, self.settings.tol)
+            if found.zero_one is not None:
+                self.zero_one[row] = found.zero_one.K
+            if found.orbit is not None:
+                period, state = found.orbit.period, found.orbit.section_state
+                self.period[row] = period
+                self.settled = self.settled.joined(SettledLater(np.array([row]), state[None], np.array([period])))
+
     def judged(self) -> Judged:
         """The verdicts that follow from the counts and the exponents."""
         n = len(self.open)
-        verdict, doubt = np.full(n, Unsettled.UNDECIDED), np.full(n, Doubt.NEAR_ZERO)
+        ending, reason = np.full(n, Ending.UNDECIDED), np.full(n, Reason.NOT_SURE)
         lasts = self.positive & ~self.all_gone & self.lasts
         some = self.positive & ~self.lasts
         cut = self.all_gone & (self.ended == self.gone)
         transient = (self.all_gone & ~cut) | (some & (self.gone >= self.settings.settled))
-        doubt[some], doubt[np.isnan(self.exponent)] = Doubt.FEW_SETTLED, Doubt.NO_EXPONENT
-        doubt[cut] = Doubt.LIMIT
-        periodic = (self.negative | (self.period > 0)) & ~self.all_gone
-        for chosen, kind in ((periodic, Unsettled.PERIODIC), (transient, Unsettled.TRANSIENT), (lasts, Unsettled.CHAOTIC)):
-            verdict[chosen], doubt[chosen] = kind, Doubt.NONE
+        reason[some], reason[np.isnan(self.exponent)] = Reason.FEW_SETTLED, Reason.NO_EXPONENTS
+        reason[cut] = Reason.LIMIT
+        repeats, together = (self.period > 0) & ~self.all_gone, self.negative & ~self.all_gone
+        for chosen, kind, why in (
+            (np.isfinite(self.zero_one), Ending.QUASI_PERIODIC, Reason.TORUS),
+            (together, Ending.PERIODIC, Reason.COMING_TOGETHER),
+            (repeats, Ending.PERIODIC, Reason.LONG_PERIOD),
+            (transient, Ending.TRANSIENT, Reason.TRANSIENT),
+            (lasts, Ending.CHAOTIC, Reason.CHAOS),
+        ):
+            ending[chosen], reason[chosen] = kind, why
         with np.errstate(divide="ignore"):
             life = np.where(lasts, (self.exposure - self.before) / 3.0, self.exposure / self.gone)
-        return Judged(verdict, doubt, self.exponent, self.error, self.gone, life, self.period, self.states, self.settled)
+        found = {name: getattr(self, name) for name in ("exponent", "error", "resolution", "zero_one", "gone", "period")}
+        return Judged(ending, reason, life=life, states=self.states, settled=self.settled, **found)
 
 
 def _companions(system: System, states: np.ndarray, settings: JudgementSettings) -> np.ndarray:

@@ -11,6 +11,7 @@ from saltus.errors import ParameterError
 from saltus.public_functions import Numbers
 
 FEWEST_ENTRIES = 100  # the shortest series, as lags reach a tenth of it
+MOST_BANDS, FEWEST_OF_BANDS = 8, 500  # the bands that are tried at most, and the fewest numbers that are then used
 CONSTANT = 1e-9  # a series that varies by less than this, relatively, counts as constant
 
 
@@ -26,6 +27,8 @@ class ZeroOne:
         Half the distance between their quartiles.
     samples
         How many numbers of the series were used.
+    every
+        Every n-th number of the series was used.
 
     Examples
     --------
@@ -36,9 +39,10 @@ class ZeroOne:
     K: float
     spread: float
     samples: int
+    every: int = 1
 
 
-def zero_one_test(series: Numbers, *, seed: int = 0, count: int = 100) -> ZeroOne:
+def zero_one_test(series: Numbers, *, every: int = 1, seed: int = 0, count: int = 100) -> ZeroOne:
     """The 0-1 test of Gottwald and Melbourne (SIAM J. Appl. Dyn. Syst. 8 (2009) 129), by the correlation method.
 
     At random frequencies c in (pi/5, 4 pi/5) the series phi drives p + i q = sum of phi_j exp(i j c), which wanders like a
@@ -47,12 +51,16 @@ def zero_one_test(series: Numbers, *, seed: int = 0, count: int = 100) -> ZeroOn
     correlation, and the median over the frequencies is taken.
 
     The series must be sampled coarsely, such as once in each forcing period: for a finely sampled series the test gives 0
-    whatever the motion is. Weak chaos takes long series, and the test does not resolve the fine structure of many tori.
+    whatever the motion is. Where chaos lies in n narrow bands that it visits in turn, as after a cascade of period doublings,
+    the test sees the regular change of band: K is near 0 however long the series is, and near 1 on every n-th number. Weak chaos
+    takes long series, and the test does not resolve the fine structure of many tori.
 
     Parameters
     ----------
     series
-        (samples,) numbers, at least 100.
+        Numbers, of which at least 100 are used.
+    every
+        Only every so-many-th number is used, as if the motion was looked at that much less often.
     seed
         The seed of the frequencies.
     count
@@ -71,8 +79,9 @@ def zero_one_test(series: Numbers, *, seed: int = 0, count: int = 100) -> ZeroOn
     >>> saltus.zero_one_test(np.sin(np.arange(2000.0))).K < 0.1, saltus.zero_one_test(logistic).K > 0.9
     (True, True)
     """
+    check_count("every", every, 1)
     try:
-        values = np.asarray(series, dtype=float)
+        values = np.asarray(series, dtype=float)[:: int(every)] if np.ndim(series) == 1 else np.asarray(series, dtype=float)
     except (TypeError, ValueError):
         raise ParameterError("the 0-1 test takes a series of numbers, one a forcing period", "series") from None
     if values.ndim != 1 or values.size < FEWEST_ENTRIES or not np.isfinite(values).all():
@@ -82,13 +91,23 @@ def zero_one_test(series: Numbers, *, seed: int = 0, count: int = 100) -> ZeroOn
     check_count("count", count, 1, 100_000)
     check_count("seed", seed, 0)
     if np.ptp(values) <= CONSTANT * max(1.0, float(np.abs(values).max())):
-        return ZeroOne(0.0, 0.0, values.size)
+        return ZeroOne(0.0, 0.0, values.size, int(every))
     lags = np.arange(1, values.size // 10 + 1)
     c = np.random.default_rng(int(seed)).uniform(np.pi / 5, 4 * np.pi / 5, (int(count), 1))
     bounded = values.mean() ** 2 * (1 - np.cos(lags * c)) / (1 - np.cos(c))
     found = [_correlation(lags, row) for row in _displacement(values, c, lags.size) - bounded]
     low, middle, high = np.quantile(found, [0.25, 0.5, 0.75])
-    return ZeroOne(float(middle), float(high - low) / 2, values.size)
+    return ZeroOne(float(middle), float(high - low) / 2, values.size, int(every))
+
+
+def zero_one_of_bands(series: np.ndarray, *, seed: int = 0) -> ZeroOne:
+    """The 0-1 test on every n-th number of a series, n = 1, 2, ..., for the n with the largest K: chaos in n bands is seen there.
+
+    So many n are tried that 500 numbers are left (all numbers are taken if there are fewer): with less, K of tori scatters by
+    more than 0.1.
+    """
+    tried = range(1, max(1, min(MOST_BANDS, series.size // FEWEST_OF_BANDS)) + 1)
+    return max((zero_one_test(series, every=every, seed=seed) for every in tried), key=lambda found: found.K)
 
 
 def _displacement(values: np.ndarray, c: np.ndarray, longest: int) -> np.ndarray:

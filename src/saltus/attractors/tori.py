@@ -1,14 +1,18 @@
-"""Whether a system can have quasi-periodic motions at all (errata 22)."""
+"""Quasi-periodic motion: whether a system can have it at all (errata 22), and whether a motion is of this kind."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
+from saltus.attractors.orbit_certificate import certify
 from saltus.attractors.stroboscopic_section import check_periodic
+from saltus.attractors.zero_one import ZeroOne, zero_one_of_bands
 from saltus.bounds import area_contraction, enclose, leaves_over_a_period, on_side
-from saltus.flow import ContactRegularity, contact_regularity
+from saltus.flow import ContactRegularity, contact_regularity, find_recurrence
+from saltus.orbits import PeriodicOrbit
 from saltus.systems import System, check_system
 from saltus.taylor import trace
 
@@ -78,3 +82,32 @@ def _continuous(system: System) -> str | None:
     if np.all(np.maximum(*(push.hi for push in pushes)) < 0.0):
         return "the load presses on the contact from both sides at all times"
     return "the load never pushes away from the contact on both sides at once"
+
+
+ORDER = 0.2  # the 0-1 test shows a regular motion where its K is below this, on every n-th state too
+
+
+@dataclass(frozen=True, eq=False)
+class RegularMotion:
+    """What is known of a motion whose largest exponent may be 0: an orbit that it approaches slowly, or that it is on a torus."""
+
+    orbit: PeriodicOrbit | None  # an attracting orbit that passes the motion
+    zero_one: ZeroOne | None  # the 0-1 test, if it shows order and nothing excludes a torus
+
+
+def regular_motion(system: System, state: np.ndarray, periods: int, tol: float) -> RegularMotion:
+    """Whether a motion from a state (d,) whose largest exponent is 0, as far as that is known, is on a torus.
+
+    It is if nothing excludes tori, if the 0-1 test of its coordinate sees order in all of the states at phase 0 and in every n-th
+    of them, and if no attracting orbit is near, which it might approach slowly.
+    """
+    if excludes_tori(system) is not None:
+        return RegularMotion(None, None)
+    ends = find_recurrence(system, state[None], periods, kept=periods, tol=tol)
+    if not ends.unsettled[0]:
+        return RegularMotion(None, None)
+    found = zero_one_of_bands(ends.states[0, :, 0])
+    if found.K >= ORDER:
+        return RegularMotion(None, None)
+    certificate = certify(system, ends.last[0], None)
+    return RegularMotion(certificate.orbit, None) if certificate.sound else RegularMotion(None, found)

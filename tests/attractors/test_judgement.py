@@ -7,9 +7,8 @@ import pytest
 from shared_systems import forced
 
 from saltus import WallOscillator, simulate_many
-from saltus.attractors import JUDGEMENT, Doubt, Earlier, JudgementSettings, SettledLater, Unsettled, judge_unsettled
-from saltus.attractors.verdict import unsettled
-from saltus.flow import Outcome, Recurrence, find_recurrence
+from saltus.attractors import JUDGEMENT, EarlierJudgement, JudgementSettings, Reason, SettledLater, judge, judgement
+from saltus.flow import Ending, Recurrence, find_recurrence
 from saltus.systems import Harmonic, Load, System
 
 FREQUENCY, AMPLITUDE = "load.frequency", "load.horizontal.amplitude"
@@ -20,27 +19,27 @@ def unsettled_states(system, path, value, periods=300, starts=6, kept=16):
     """The last states of the motions from random states that have not settled at one value, (1, n, 2)."""
     states = np.random.default_rng(1).uniform(-2.0, 2.0, (starts, 2))
     ends = find_recurrence(system, states, periods, parameters={path: np.full(starts, value)}, kept=kept)
-    return ends.states[ends.outcome == Outcome.MOVING].reshape(1, -1, 2)
+    return ends.states[ends.outcome == Ending.UNDECIDED].reshape(1, -1, 2)
 
 
 def judged(system, path, value, **options):
-    return judge_unsettled(system, unsettled_states(system, path, value, **options), {path: np.array([value])})
+    return judge(system, unsettled_states(system, path, value, **options), {path: np.array([value])})
 
 
 def test_the_motion_that_erratum_32_overlooked_is_chaotic():
     """The review of the results, section 2: Omega = 0.5, Hhat = 0.105, exponent about 0.07 by two integrators."""
     found = judged(forced(0.105, 0.5), AMPLITUDE, 0.105)
-    assert found.verdict.tolist() == [Unsettled.CHAOTIC]
+    assert found.ending.tolist() == [Ending.CHAOTIC]
     assert found.exponent[0] == pytest.approx(0.07, abs=0.01)
     assert found.error[0] < 0.01
-    assert found.doubt.tolist() == [Doubt.NONE]
+    assert found.reason.tolist() == [Reason.CHAOS]
 
 
 def test_a_transient_is_one_and_its_life_is_that_of_an_ensemble():
     """numerics.md: transients at Omega = 4, Hhat between 7.2 and 7.7; the life by plain simulation without any judgement."""
     system = forced(7.2, 4.0)
     found = judged(system, AMPLITUDE, 7.2, starts=24)
-    assert found.verdict.tolist() == [Unsettled.TRANSIENT]
+    assert found.ending.tolist() == [Ending.TRANSIENT]
     states = np.random.default_rng(2).uniform(-2.0, 2.0, (400, 2))
     ends = simulate_many(system, theta=states[:, 0], velocity=states[:, 1], periods=3000, until=("settled",), tol=1e-11)
     late = ends["periods"].values
@@ -64,7 +63,7 @@ def test_a_slow_linear_oscillator_is_periodic_with_half_its_damping_as_exponent(
         model=WallOscillator(stiffness=1.0, damping=0.005, wall=50.0), load=Load(frequency=1.7, force=Harmonic(amplitude=0.1))
     )
     found = judged(system, FREQUENCY, 1.7)
-    assert found.verdict.tolist() == [Unsettled.PERIODIC]
+    assert found.ending.tolist() == [Ending.PERIODIC]
     assert found.exponent[0] == pytest.approx(-0.0025, rel=0.01)
     assert found.period.tolist() == [1]
 
@@ -73,8 +72,8 @@ def test_weak_chaos_is_chaos_and_a_period_longer_than_was_looked_for_is_none():
     """Both near the end of the cascade of period doublings at Omega = 0.3994, Hhat = 0.2 (numerics.md)."""
     values, system = np.array([0.397, 0.397875]), forced(0.2)
     states = np.concatenate([unsettled_states(system, FREQUENCY, value)[:, :16] for value in values])
-    found = judge_unsettled(system, states, {FREQUENCY: values})
-    assert found.verdict.tolist() == [Unsettled.CHAOTIC, Unsettled.PERIODIC]
+    found = judge(system, states, {FREQUENCY: values})
+    assert found.ending.tolist() == [Ending.CHAOTIC, Ending.PERIODIC]
     assert 0.0 < found.error[0] < found.exponent[0] < 0.01
     (state,), (period,) = found.settled.state, found.settled.period
     later = simulate_many(system.with_({FREQUENCY: 0.397875}), theta=state[0], velocity=state[1], periods=int(period), last="all")
@@ -86,28 +85,28 @@ def test_weak_chaos_is_chaos_and_a_period_longer_than_was_looked_for_is_none():
 
 def test_what_is_looked_at_too_briefly_is_undecided():
     short = JudgementSettings(companions=4, rounds=0)
-    found = judge_unsettled(forced(7.2, 4.0), unsettled_states(forced(7.2, 4.0), AMPLITUDE, 7.2), {}, settings=short)
-    assert found.verdict.tolist() == [Unsettled.UNDECIDED]
-    assert found.doubt.tolist() == [Doubt.FEW_SETTLED]
+    found = judge(forced(7.2, 4.0), unsettled_states(forced(7.2, 4.0), AMPLITUDE, 7.2), {}, settings=short)
+    assert found.ending.tolist() == [Ending.UNDECIDED]
+    assert found.reason.tolist() == [Reason.FEW_SETTLED]
 
 
 def test_a_question_is_answered_the_same_alone_and_among_others():
     system, values = forced(0.2), np.array([0.37, 0.38, 0.39])
     states = np.concatenate([unsettled_states(system, FREQUENCY, value)[:, :16] for value in values])
-    many = judge_unsettled(system, states, {FREQUENCY: values})
-    one = judge_unsettled(system, states[1:2], {FREQUENCY: values[1:2]})
-    assert (many.verdict[1], many.exponent[1], many.error[1]) == (one.verdict[0], one.exponent[0], one.error[0])
+    many = judge(system, states, {FREQUENCY: values})
+    one = judge(system, states[1:2], {FREQUENCY: values[1:2]})
+    assert (many.ending[1], many.exponent[1], many.error[1]) == (one.ending[0], one.exponent[0], one.error[0])
     assert np.array_equal(many.states[1], one.states[0])
 
 
 def test_chaos_that_was_judged_before_is_judged_on_from_there():
     """What an earlier judgement has shown counts: its exponent stays, and fewer forcing periods exclude the same life."""
     system, value = forced(0.2), np.array([0.38])
-    first = judge_unsettled(system, unsettled_states(system, FREQUENCY, 0.38)[:, :16], {FREQUENCY: value}, settings=BRIEF)
-    known = Earlier(first.exponent, first.error, 3.0 * first.life)
+    first = judge(system, unsettled_states(system, FREQUENCY, 0.38)[:, :16], {FREQUENCY: value}, settings=BRIEF)
+    known = EarlierJudgement(first.exponent, first.error, 3.0 * first.life)
     careful = replace(BRIEF, exposure=20_000, rounds=3)
-    found = judge_unsettled(system, first.states, {FREQUENCY: value}, settings=careful, earlier=known)
-    assert first.verdict.tolist() == found.verdict.tolist() == [Unsettled.CHAOTIC]
+    found = judge(system, first.states, {FREQUENCY: value}, settings=careful, earlier=known)
+    assert first.ending.tolist() == found.ending.tolist() == [Ending.CHAOTIC]
     assert found.exponent[0] == first.exponent[0]
     assert 3.0 * first.life[0] >= BRIEF.exposure
     assert 20_000 <= 3.0 * found.life[0] < 20_000 + BRIEF.companions * BRIEF.round_periods
@@ -115,9 +114,9 @@ def test_chaos_that_was_judged_before_is_judged_on_from_there():
 
 def test_an_earlier_judgement_that_was_wrong_is_corrected():
     system = forced(7.2, 4.0)
-    wrong = Earlier(np.array([0.1]), np.array([0.01]), np.array([2000.0]))
+    wrong = EarlierJudgement(np.array([0.1]), np.array([0.01]), np.array([2000.0]))
     states = unsettled_states(system, AMPLITUDE, 7.2, starts=24)
-    assert judge_unsettled(system, states, {AMPLITUDE: np.array([7.2])}, earlier=wrong).verdict.tolist() == [Unsettled.TRANSIENT]
+    assert judge(system, states, {AMPLITUDE: np.array([7.2])}, earlier=wrong).ending.tolist() == [Ending.TRANSIENT]
 
 
 def test_few_keeps_so_many_motions_of_each_period_and_of_each_question():
@@ -142,10 +141,10 @@ def processes(monkeypatch):
         n, when = len(states), np.where(states[:, 0] > 0.5, np.inf, rng.exponential(2000.0, len(states)))
         gone = when < periods
         asked.append(np.minimum(when, periods).sum())
-        outcome = np.where(gone, Outcome.PERIODIC, Outcome.MOVING).astype(np.int8)
+        outcome = np.where(gone, Ending.PERIODIC, Ending.UNDECIDED).astype(np.int8)
         return Recurrence(outcome, gone.astype(int), np.minimum(when, periods), states, np.empty((n, 0, 2)))
 
-    monkeypatch.setattr(unsettled, "find_recurrence", settle_by_chance)
+    monkeypatch.setattr(judgement, "find_recurrence", settle_by_chance)
     return asked
 
 
@@ -153,22 +152,22 @@ def verdicts_of(on_attractor, settings=JUDGEMENT, count=200):
     """The verdicts of questions of which so many companions are on the attractor, whose exponent is known."""
     states = np.zeros((count, settings.companions, 2))
     states[:, :on_attractor, 0] = 1.0
-    known = Earlier(np.full(count, 0.1), np.full(count, 0.01), np.zeros(count))
-    return judge_unsettled(forced(0.2), states, {AMPLITUDE: np.full(count, 0.2)}, settings=settings, earlier=known).verdict
+    known = EarlierJudgement(np.full(count, 0.1), np.full(count, 0.01), np.zeros(count))
+    return judge(forced(0.2), states, {AMPLITUDE: np.full(count, 0.2)}, settings=settings, earlier=known).ending
 
 
 def test_a_transient_is_told_without_waiting_for_an_attractor_that_is_not_there(processes):
-    assert (verdicts_of(0) == Unsettled.TRANSIENT).all()
+    assert (verdicts_of(0) == Ending.TRANSIENT).all()
     early = sum(processes)
     processes.clear()
-    assert (verdicts_of(0, replace(JUDGEMENT, fewest_rounds=100)) == Unsettled.TRANSIENT).all()
+    assert (verdicts_of(0, replace(JUDGEMENT, fewest_rounds=100)) == Ending.TRANSIENT).all()
     assert early < 0.6 * sum(processes)
 
 
 def test_an_attractor_beside_a_transient_is_seen_as_ever_fewer_motions_settle(processes):
     """Of the companions that are not on it exp(-3/4) are left after each round: after some rounds all but a few are on it."""
-    assert (verdicts_of(JUDGEMENT.companions) == Unsettled.CHAOTIC).all()
-    assert (verdicts_of(JUDGEMENT.companions // 3) == Unsettled.CHAOTIC).mean() > 0.8
+    assert (verdicts_of(JUDGEMENT.companions) == Ending.CHAOTIC).all()
+    assert (verdicts_of(JUDGEMENT.companions // 3) == Ending.CHAOTIC).mean() > 0.8
 
 
 def test_fewer_companions_in_longer_rounds_see_an_attractor_more_surely_in_less_time(processes):
@@ -176,7 +175,7 @@ def test_fewer_companions_in_longer_rounds_see_an_attractor_more_surely_in_less_
     wrong, work = [], []
     for settings in (JUDGEMENT, replace(JUDGEMENT, companions=24, round_periods=1000)):
         processes.clear()
-        wrong.append((verdicts_of(settings.companions // 3, settings) != Unsettled.CHAOTIC).mean())
+        wrong.append((verdicts_of(settings.companions // 3, settings) != Ending.CHAOTIC).mean())
         work.append(sum(processes))
     assert wrong[0] < 0.5 * wrong[1]
     assert work[0] < work[1]

@@ -1,0 +1,360 @@
+"""The attractors of a system: found from a window of initial states, certified, counted, and joined with the known orbits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from saltus.attractors.attractor import LAST_STATES, REST, SAME_STATE, UNDECIDED, Attractor, Attractors, Target
+from saltus.attractors.classification import classify
+from saltus.attractors.orbit_certificate import solved_orbit, stays_at_rest
+from saltus.attractors.stroboscopic_section import section_states, with_clock
+from saltus.checks import check_count, check_number, check_reached, check_starts, check_states
+from saltus.errors import ParameterError
+from saltus.flow import RECURRENCE, Ending, Recurrence, extrema_names, find_recurrence, motions_from, stroboscopic
+from saltus.orbits import Branch, PeriodicOrbit, before_impacts, initial_states, is_symmetric, rest_state, start_at, state_vector
+from saltus.progress import Progress, part_of, silent
+from saltus.public_functions import checked_by
+from saltus.systems import System, image_of
+from saltus.window import Box, check_window
+
+
+@dataclass(frozen=True)
+class AttractorSearchSettings:
+    """How long motions are followed before their attractors are determined, and how they are assigned to these."""
+
+    first: int = 400  # All motions are followed for this many forcing periods.
+    second: int = 4000  # Those that have not settled by then are followed for this many more, and so may be those to be judged.
+    kept: int = 256  # Number of last stroboscopic states of a motion that are compared with attractors that do not repeat.
+    verdicts: int = 8  # The largest number of unsettled motions that are classified, as each takes seconds.
+    sample: int = 2048  # Number of stroboscopic states that represent a set that does not repeat.
+    # If the sum of the exponents is above minus this, areas of the state plane do not shrink, and the set attracts nothing.
+    lossless: float = 1e-6
+    # The largest distance, in units of SAME_STATE, between an orbit and the states of the motions that settle on it.
+    beside: float = 100.0
+
+
+SETTINGS = AttractorSearchSettings()
+WAITING = UNDECIDED - 1  # the label of motions that may still be assigned to an attractor
+
+
+@dataclass
+class KnownAttractors:
+    """The attractors of a system with a forcing period; the label of each is its place in the list."""
+
+    system: System
+    members: list[Attractor] = field(default_factory=list)
+    reasons: list[str] = field(default_factory=list)  # why motions are undecided
+
+    def assign(self, ends: Recurrence) -> np.ndarray:
+        """The label of the attractor on which each motion ends, or WAITING or UNDECIDED, (n,)."""
+        labels = np.full(len(ends), WAITING)
+        for row in np.flatnonzero(ends.rest):
+            labels[row] = self.add_rest(self._rest_state(ends.last[row]))
+        if ends.ended.any():
+            labels[ends.ended] = UNDECIDED
+            self.reasons.append(f"{int(ends.ended.sum())} motions are ended by a margin of the model or cannot go on")
+        for period in np.unique(ends.period[ends.periodic]):
+            rows = np.flatnonzero(ends.period == period)
+            while rows.size:
+                states = ends.states[rows[0], -period:]
+                here = _cycle(states).distance(ends.states[rows, -1]) < _near(states)
+                here[0] = True
+                labels[rows[here]] = self._settled(states)
+                rows = rows[~here]
+        return labels
+
+    def _settled(self, states: np.ndarray) -> int:
+        """The label of the orbit on whose states motions have settled; UNDECIDED where its equations have no stable solution."""
+        known = self.label_of(states)
+        if known is not None:
+            return known
+        if len(states) == 1 and stays_at_rest(self.system, states[-1]):
+            return self.add_rest(states[-1])
+        where = f"at {_shown(states[-1])}"
+        orbit = solved_orbit(self.system, states[-1], len(states))
+        if orbit is None or _cycle(states).distance(orbit.section_state) > SETTINGS.beside * _near(states):
+            return self._fail(
+                f"motions repeat themselves every {len(states)} periods {where}, but no orbit solves its equations there"
+            )
+        if not orbit.stable:
+            largest = np.abs(orbit.multipliers).max()
+            return self._fail(
+                f"motions stay on an orbit of period {orbit.period} {where} with a multiplier of modulus {largest:.6g}"
+            )
+        return self.add_orbit(orbit, states[-orbit.period :])
+
+    def _fail(self, reason: str) -> int:
+        self.reasons.append(reason)
+        return UNDECIDED
+
+    def _rest_state(self, last: np.ndarray) -> np.ndarray:
+        """The state in which a motion with this last state rests: the contact or, with several contacts or frictions, this
+        state."""
+        return last if self.system.model.held else rest_state(self.system)
+
+    def add_rest(self, state: np.ndarray) -> int:
+        """The label of rest in a state (d,)."""
+        for member in self.members:
+            if member.kind is Ending.REST and np.abs(member.states[0] - state).max() < _near(state):
+                return member.label
+        held = state[: len(self.system.model.coordinates)]
+        evidence = "proved: captured at the contact for all later loads, or at rest where no load ever pulls"
+        return self._add(Ending.REST, state[None], (float(held.min()), float(held.max())), evidence)
+
+    def add_orbit(self, orbit: PeriodicOrbit, states: np.ndarray | None = None) -> int:
+        """The label of a stable orbit."""
+        if states is None:
+            states = section_states(self.system, orbit.section_state[None], orbit.period)[0]
+        known = self.label_of(states)
+        if known is not None:
+            return known
+        largest = np.abs(orbit.multipliers).max()
+        evidence = f"orbit of period {orbit.period}: residual {orbit.residual:.1g}, largest multiplier {largest:.6g}"
+        return self._add(Ending.PERIODIC, states, (orbit.lowest, orbit.highest), evidence, orbit)
+
+    def _add(
+        self,
+        kind: Ending,
+        states: np.ndarray,
+        extrema: tuple[float, float],
+        evidence: str,
+        orbit: PeriodicOrbit | None = None,
+    ) -> int:
+        low, high = extrema
+        target = Target(len(self.members), kind, states)
+        self.members.append(Attractor(target, high, low, orbit, starts=0, of=0, mirror=UNDECIDED, evidence=evidence))
+        return target.label
+
+    def label_of(self, states: np.ndarray) -> int | None:
+        """The label of the orbit, or of rest, with these states at phase 0; None if it is not known."""
+        for member in self.members:
+            if not member.target.dense and (member.target.distance(states) < _near(states)).all():
+                return member.label
+        return None
+
+    def assign_unsettled(self, ends: Recurrence, labels: np.ndarray) -> None:
+        """Label the unsettled motions that move on a known sampled attractor, or within SAME_STATE of a known orbit."""
+        for i in np.flatnonzero(labels == WAITING):
+            last = ends.states[i, -LAST_STATES:]
+            for target in (member.target for member in self.members):
+                apart = target.distance(last)
+                if np.median(apart) < target.grain if target.dense else apart[-len(target.states) :].max() < _near(last[-1:]):
+                    labels[i] = target.label
+                    break
+
+    def judge(self, state: np.ndarray, max_period: int) -> int:
+        """Classify a motion that does not settle, from a state (d,): the label of its attractor, or UNDECIDED if it has none."""
+        start, longest = start_at(self.system, state), max(max_period, 16)
+        verdict = classify(self.system, **start, periods=SETTINGS.second, max_period=longest)
+        if verdict.kind is Ending.REST:
+            return self.add_rest(self._rest_state(state_vector(self.system, verdict.state)))
+        if verdict.orbit is not None and verdict.kind is Ending.PERIODIC:
+            return self.add_orbit(verdict.orbit)
+        where = f"from {_shown(state)}"
+        if verdict.kind is Ending.UNDECIDED or verdict.exponents is None:
+            return self._fail(f"{where}: {verdict.reason}")
+        if float(verdict.exponents.values.sum()) > -SETTINGS.lossless:
+            return self._fail(f"{where}: {verdict.kind}, but areas do not shrink, so nothing attracts")
+        sample = motions_from(
+            self.system, state[None], periods=SETTINGS.sample, sample=("state", "extrema"), last="all", tol=1e-10
+        )
+        high, low = (float(sample[f"overall_{name}"].values[0]) for name in extrema_names(self.system.model.coordinates))
+        return self._add(verdict.kind, stroboscopic(self.system, sample)[0], (low, high), verdict.reason)
+
+    def add_images(self) -> None:
+        """Add the mirror image of every attractor of a system with that symmetry: it is an attractor as well."""
+        if not is_symmetric(self.system):
+            return
+        for label in range(len(self.members)):
+            image = self._image(self.members[label]) if self.members[label].mirror == UNDECIDED else None
+            if image is not None:
+                for one, other in ((label, image), (image, label)):
+                    self.members[one] = replace(self.members[one], mirror=other)
+
+    def _image(self, member: Attractor) -> int | None:
+        """The label of the mirror image of an attractor."""
+        states = image_of(self.system.model, section_states(self.system, member.states, 0.5)[:, 0])
+        if member.target.dense:
+            for other in (known.target for known in self.members if known.target.dense):
+                if np.median(other.distance(states)) < other.grain:
+                    return other.label
+            evidence = f"mirror image of a {member.kind} one: {member.evidence}"
+            return self._add(member.kind, states, (-member.highest, -member.lowest), evidence)
+        known_label = self.label_of(states)
+        if known_label is not None:
+            return known_label
+        orbit = solved_orbit(self.system, states[-1], len(states))
+        return self.add_orbit(orbit) if orbit is not None and orbit.stable else None
+
+
+def _cycle(states: np.ndarray) -> Target:
+    return Target(0, Ending.PERIODIC, states)
+
+
+def _shown(state: np.ndarray) -> str:
+    return f"({', '.join(f'{value:.6g}' for value in state)})"
+
+
+def _near(states: np.ndarray) -> float:
+    return float(SAME_STATE * max(1.0, np.abs(states).max()))
+
+
+def _check(
+    system: System, window: Any, starts: int, max_period: int, seed: int, known: Any, also: Any, tol: float, progress: object
+) -> None:
+    with_clock(system)
+    further = check_states("also", also, system.dimension)
+    for place, coordinate in enumerate(system.model.coordinates):
+        check_reached(system.model, coordinate, further[:, place], "also")
+    check_starts(starts)
+    check_count("max_period", max_period, 1, RECURRENCE.compiled_max_period)
+    check_number("tol", tol, at_least=1e-15, at_most=1e-6)
+    check_window(window, system)
+    check_count("seed", seed, 0)
+    _known(system, known)
+
+
+@checked_by(_check)
+def find_attractors(
+    system: System,
+    *,
+    window: Box | None = None,
+    starts: int = 256,
+    max_period: int = 16,
+    seed: int = 0,
+    known: Iterable[PeriodicOrbit | Branch] | PeriodicOrbit | Branch = (),
+    also: Any = (),
+    tol: float = 1e-11,
+    progress: Progress = silent,
+) -> Attractors:
+    """The attractors on which motions from a window of initial states at phase 0 end, each certified, with its share of the
+    motions.
+
+    Rest is certified by proof (`capture_speed`, or no load that ever pulls); a periodic orbit by its own equations, solved to
+    rounding, with multipliers inside the unit circle; a set on which motions never settle by the verdict of `classify`, if areas
+    of states shrink. Other motions are undecided; they are counted, with the reasons. In a symmetric system the mirror image of
+    an attractor is another attractor, unless it is the same set, and is added even if no start leads to it. Under a constant
+    load the equilibria are found, as orbits of period 1.
+
+    Parameters
+    ----------
+    system
+        What moves, under a load with a frequency or a constant one.
+    window
+        Bounds of the states, ((least, largest coordinate), (least, largest velocity)), covered evenly by initial states; with
+        several coordinates a pair for each of them, then for each velocity. By default half widths are 1.5 around the contact,
+        or around 0 without one. With several contacts the starts take turns as to which contacts are closed.
+    starts
+        The number of initial states.
+    max_period
+        The longest period of an orbit, at most 16.
+    seed
+        The seed by which the grid of initial states is shifted.
+    known
+        Orbits, or branches with orbits at the system's parameter, of which the stable ones count as attractors too.
+    also
+        Further initial states (n, d), coordinates and velocities, which do not count in the shares. A state at a contact that
+        moves into it is taken just before the impact.
+    tol
+        The error of a step, as for `simulate_many`.
+    progress
+        Called with the fraction done and what is being done.
+
+    Raises
+    ------
+    ParameterError
+        A load that never repeats, known orbits of another system, numbers without meaning.
+
+    Examples
+    --------
+    >>> found = saltus.find_attractors(system, starts=16)
+    >>> [attractor.period for attractor in found]
+    [1]
+    """
+    clock, further, area = with_clock(system), check_states("also", also, system.dimension), check_window(window, system)
+    progress(0.0, "motions")
+    states, found = initial_states(clock, starts, area, seed), KnownAttractors(clock)
+    for orbit in _known(system, known):
+        found.add_orbit(orbit)
+    begun = np.concatenate([states, before_impacts(clock, further)])
+    labels = _assigned(found, begun, max_period, tol, progress)
+    found.add_images()
+    final = final_labels(found.members)
+    counts = np.bincount(labels[:starts][labels[:starts] >= 0], minlength=len(found.members))
+    ends = np.array([final.get(int(label), UNDECIDED) for label in labels], dtype=int)
+    members = [member.labelled(final, starts=int(counts[member.label]), of=starts) for member in found.members]
+    members.sort(key=lambda member: member.label)
+    progress(1.0, "attractors")
+    return Attractors(system, tuple(members), states, ends[:starts], ends[starts:], area, seed, tol, tuple(found.reasons))
+
+
+def _assigned(found: KnownAttractors, states: np.ndarray, max_period: int, tol: float, progress: Progress) -> np.ndarray:
+    """The label among the known attractors on which each motion ends; below 0 where that is undecided."""
+    options: dict[str, Any] = {"max_period": max_period, "kept": SETTINGS.kept, "tol": tol}
+    ends = find_recurrence(found.system, states, SETTINGS.first, **options, progress=part_of(progress, 0.0, 0.3))
+    labels = found.assign(ends)
+    left = np.flatnonzero(labels == WAITING)
+    if not left.size:
+        return labels
+    begin = ends.states[left, -1]
+    ends = find_recurrence(found.system, begin, SETTINGS.second, **options, progress=part_of(progress, 0.3, 0.7))
+    later = found.assign(ends)
+    found.assign_unsettled(ends, later)
+    for turn in range(SETTINGS.verdicts):
+        waiting = np.flatnonzero(later == WAITING)
+        if not waiting.size:
+            break
+        later[waiting[0]] = found.judge(ends.states[waiting[0], -1], max_period)
+        found.assign_unsettled(ends, later)
+        progress(0.7 + 0.3 * turn / SETTINGS.verdicts, "verdicts")
+    if (later == WAITING).any():
+        periods = SETTINGS.first + SETTINGS.second
+        found.reasons.append(f"{int((later == WAITING).sum())} motions do not settle in {periods} forcing periods")
+    labels[left] = np.where(later == WAITING, UNDECIDED, later)
+    return labels
+
+
+def final_labels(members: list[Attractor]) -> dict[int, int]:
+    """The final labels by the labels of the known ones, in an order that does not depend on the search: rest, then orbits by
+    period, amplitude and sign, then others.
+
+    With several contacts there may be more than one state of rest; 0 is the one with the least coordinates.
+    """
+
+    def rank(member: Attractor) -> tuple[float, ...]:
+        if member.kind is Ending.REST:
+            return -1.0, *map(float, member.states[0])
+        if member.orbit is None:
+            return 1.0, 0.0, round(member.amplitude, 2), -round(float(member.states[:, 0].mean()), 2)
+        return 0.0, float(member.period), round(member.amplitude, 6), -round(member.highest, 6)
+
+    ordered = sorted(members, key=rank)
+    first = REST if ordered and ordered[0].kind is Ending.REST else REST + 1
+    return {member.label: i for i, member in enumerate(ordered, first)}
+
+
+def _known(system: System, known: Any) -> list[PeriodicOrbit]:
+    """The stable orbits among those that are known, and among those of known branches at the system's parameter."""
+    orbits: list[PeriodicOrbit] = []
+    for item in [known] if isinstance(known, (PeriodicOrbit, Branch)) else known:
+        if isinstance(item, Branch):
+            orbits += item.at(float(system.get(item.path)))
+        elif isinstance(item, PeriodicOrbit):
+            orbits.append(item)
+        else:
+            raise ParameterError(f"known must be periodic orbits or branches, got {item!r}", "known")
+    for orbit in orbits:
+        theirs = orbit.system.parameters
+        unlike = [
+            p for p, x in system.parameters.items() if not math.isclose(theirs.get(p, math.nan), x, rel_tol=1e-9, abs_tol=1e-12)
+        ]
+        if unlike or type(orbit.system.model) is not type(system.model):
+            raise ParameterError(
+                f"a known orbit belongs to another system; it differs in {', '.join(unlike) or 'its model'}", "known"
+            )
+    return [orbit for orbit in orbits if orbit.stable]

@@ -1,0 +1,225 @@
+"""The growth of small perturbations of many motions, and the largest exponents of groups of these, for the judge of chaos.
+
+Perturbations grow by derivatives (`Stretching`) or, with several contacts, as the distance of two motions (`Neighbours`).
+The derivative of a motion with several contacts must be carried through every event by the scalar kernel, with a column for each
+state variable; two motions are followed in lanes, also through accumulations of impacts, which is faster.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import stdtrit
+
+from saltus.attractors.lyapunov.averages import LYAPUNOV, resolution
+from saltus.flow import Stop, ensemble_from
+from saltus.orbits import states_beside
+from saltus.systems import System
+
+
+class Perturbations(ABC):
+    """A perturbation of each motion, which has turned to the direction of the largest growth before its growth is measured.
+
+    Parameters
+    ----------
+    system
+        What moves, under a load with a frequency.
+    states
+        (groups, size, d) at phase 0, where the motions begin.
+    parameters
+        Numbers by dotted path, (groups,) each, in place of the system's.
+    turning
+        Forcing periods in which the perturbations turn to the direction that grows, before their growth counts.
+    tol
+        The error of a step.
+    """
+
+    def __init__(
+        self, system: System, states: np.ndarray, parameters: Mapping[str, np.ndarray], *, turning: int, tol: float
+    ) -> None:
+        groups, self.size, d = states.shape
+        frequency = parameters.get("load.frequency", np.array(system.load.frequency, dtype=float))
+        self.system, self.tol, self.lengths = system, tol, np.broadcast_to(2.0 * math.pi / frequency, groups)
+        self.columns = {path: np.repeat(values, self.size) for path, values in parameters.items()}
+        self.here = states.reshape(-1, d).copy()  # (n, d): nan once a motion is lost
+        self.direction = np.full_like(self.here, math.sqrt(1.0 / d))
+        self.growth = np.zeros(groups * self.size)  # ln of the factor by which each has grown; nan once its motion is lost
+        self.periods = np.zeros(groups, dtype=int)
+        self._go_on(np.arange(groups), max(1, turning))
+        self.growth[:], self.periods[:] = np.where(np.isnan(self.growth), np.nan, 0.0), 0
+
+    def rates(self, rows: np.ndarray, periods: int) -> tuple[np.ndarray, np.ndarray]:
+        """Rates of growth (groups, size) over so many periods in all, of these groups; and their times, (groups,)."""
+        self._go_on(rows, periods)
+        time = self.periods[rows] * self.lengths[rows]
+        return self.growth.reshape(-1, self.size)[rows] / time[:, None], time
+
+    def _go_on(self, rows: np.ndarray, periods: int) -> None:
+        """Follow these groups until so many periods are done; none depends on the others."""
+        while (rows := rows[self.periods[rows] < periods]).size:
+            spans = np.minimum(self.longest_spans(rows), periods - self.periods[rows])
+            for span in np.unique(spans).tolist():
+                part = rows[spans == span]
+                motions = (part[:, None] * self.size + np.arange(self.size)).ravel()
+                self.step(motions[np.isfinite(self.here[motions]).all(axis=1)], span)
+                self.periods[part] += span
+
+    @abstractmethod
+    def longest_spans(self, rows: np.ndarray) -> np.ndarray:
+        """The largest number of forcing periods of a step of each of these groups."""
+
+    @abstractmethod
+    def step(self, motions: np.ndarray, periods: int) -> None:
+        """Follow the motions of these indices for so many periods: update their states, the perturbations and the growth."""
+
+
+class Stretching(Perturbations):
+    """Perturbations by derivatives, which are accurate along the growing direction however long a step is."""
+
+    def longest_spans(self, rows: np.ndarray) -> np.ndarray:
+        """A step may be as long as the run."""
+        return np.full(len(rows), np.iinfo(int).max)
+
+    def step(self, motions: np.ndarray, periods: int) -> None:
+        """Follow these motions with their derivatives."""
+        columns = {path: values[motions] for path, values in self.columns.items()}
+        found = stretched(self.system, self.here[motions], self.direction[motions], columns, periods, self.tol)
+        self.here[motions], self.direction[motions] = found[:2]
+        self.growth[motions] += found[2]
+
+
+def stretched(
+    system: System, states: np.ndarray, direction: np.ndarray, columns: Mapping[str, np.ndarray], periods: int, tol: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """States, directions and ln of the growth of small perturbations after so many periods; nan where a motion is lost.
+
+    If a rest, closed contacts or sticking frictions reduce a perturbation to 0, its factor is the smallest positive number.
+    """
+    here = np.isfinite(states).all(axis=1)
+    later, turned, growth = np.full_like(states, np.nan), np.full_like(states, np.nan), np.full(len(states), np.nan)
+    if not here.any():
+        return later, turned, growth
+    chosen = {path: values[here] for path, values in columns.items()}
+    ends = ensemble_from(system, states[here], periods, parameters=chosen, tol=tol, until=("rest",), derivatives=True)
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        grown = np.einsum("nij,nj->ni", ends.derivatives, direction[here])
+        size = np.abs(grown).max(axis=1, keepdims=True)  # squares of perturbations that have grown by 1e200 would overflow
+        length = size[:, 0] * np.linalg.norm(grown / np.where(size > 0.0, size, 1.0), axis=1)
+        # Motions that are captured at rest are given up, as following their impacts to the rest would take millions of these.
+        moving = (ends.side != 0) & ~ends.stopped(Stop.CAPTURED)
+        gone = length == 0.0  # after a rest all that was beside the motion is in the same state
+        going = moving & np.isfinite(length) & ((length > 0.0) | gone)
+        growth[here] = np.where(going, np.log(np.maximum(length, np.finfo(float).tiny)), np.nan)
+        turned[here] = np.where(gone[:, None], direction[here], grown / length[:, None])
+    later[here] = np.where(going[:, None], ends.last, np.nan)
+    return later, turned, growth
+
+
+class Neighbours(Perturbations):
+    """Pairs of motions, whose distance is reset to 1e-7 after each span."""
+
+    def longest_spans(self, rows: np.ndarray) -> np.ndarray:
+        """The number of forcing periods within which neighbours stay near, even if they are chaotic."""
+        return np.asarray(np.clip(LYAPUNOV.pair_span / self.lengths[rows], 1, LYAPUNOV.pair_periods).astype(int))
+
+    def step(self, motions: np.ndarray, periods: int) -> None:
+        """Follow these motions and their neighbours, and bring each pair together again."""
+        if not motions.size:
+            return
+        here, away = self.here[motions], LYAPUNOV.distance * self.direction[motions]
+        beside = states_beside(self.system, here, away)
+        twice = {path: np.tile(values[motions], 2) for path, values in self.columns.items()}
+        ends = ensemble_from(self.system, np.concatenate([here, beside]), periods, parameters=twice, tol=self.tol)
+        moving = (ends.side != 0) & ends.stopped(Stop.HORIZON)
+        first, second = ends.last.reshape(2, *here.shape)
+        going = moving.reshape(2, -1).all(axis=0) & np.isfinite(first).all(axis=1)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            factor = np.linalg.norm(second - first, axis=1) / np.linalg.norm(beside - here, axis=1)
+            turned, growth = (second - first) / np.linalg.norm(second - first, axis=1)[:, None], np.log(factor)
+        weak = np.flatnonzero(going & ~(factor > LYAPUNOV.least_of_pair))
+        if weak.size:
+            columns = {path: values[motions[weak]] for path, values in self.columns.items()}
+            direction = self.direction[motions[weak]]
+            first[weak], turned[weak], growth[weak] = stretched(self.system, here[weak], direction, columns, periods, self.tol)
+        self.here[motions] = np.where(going[:, None], first, np.nan)
+        self.direction[motions] = turned
+        self.growth[motions] += np.where(going, growth, np.nan)
+
+
+FEWEST = 4  # the fewest motions from whose scatter an error is taken
+
+
+@dataclass(frozen=True, eq=False)
+class Largest:
+    """Largest exponents with half widths of their 95 % intervals, per unit of dimensionless time; an entry for each group."""
+
+    exponent: np.ndarray  # (groups,): nan where fewer than four motions of a group have an exponent
+    error: np.ndarray
+    resolution: np.ndarray  # (groups,): what regular motion may show
+    positive: np.ndarray  # (groups,): whether it is above its error and the resolution
+    negative: np.ndarray  # (groups,): whether it is below them
+
+    @classmethod
+    def unknown(cls, groups: int) -> Largest:
+        """The entries of so many groups of which nothing is known yet."""
+        return cls(*np.full((3, groups), np.nan), *np.zeros((2, groups), dtype=bool))
+
+    def put(self, rows: np.ndarray, other: Largest) -> None:
+        """Replace the entries of these groups."""
+        for name in ("exponent", "error", "resolution", "positive", "negative"):
+            getattr(self, name)[rows] = getattr(other, name)
+
+
+class LargestExponents:
+    """The largest exponent of each group of motions, from a run that can be made longer while the sign is open.
+
+    The motions of a group are taken as independent samples of one attractor, so that their scatter gives the error, by Student's
+    t. Motions that are lost are left out, and so are motions whose perturbations surely shrink if those of others surely grow.
+    The growth is that of derivatives (`Stretching`) or, with several contacts, of the distance of two motions (`Neighbours`).
+
+    The resolution is 2 ln(t) / t for the time t of one motion, as the distance of regular motions may grow like t^2.
+
+    Parameters
+    ----------
+    system
+        What moves, under a load with a frequency.
+    states
+        (groups, size, d) at phase 0.
+    parameters
+        Numbers by dotted path, (groups,) each, in place of the system's.
+    shortest
+        The forcing periods of the shortest run. Before it, perturbations are followed for a quarter of this time, to turn to the
+        direction that grows.
+    tol
+        The error of a step.
+    """
+
+    def __init__(
+        self, system: System, states: np.ndarray, parameters: Mapping[str, np.ndarray], *, shortest: int, tol: float = 1e-10
+    ) -> None:
+        kind = Neighbours if system.model.contacts else Stretching
+        self._perturbations = kind(system, states, parameters, turning=shortest // 4, tol=tol)
+        self.found = Largest.unknown(len(states))
+
+    def go_on(self, rows: np.ndarray, periods: int) -> None:
+        """Measure the exponents of these groups over so many forcing periods in all."""
+        self.found.put(rows, _averaged(*self._perturbations.rates(rows, periods)))
+
+
+def _averaged(rates: np.ndarray, duration: np.ndarray) -> Largest:
+    """The averages of rates (groups, size) over these times, (groups,); averages within the resolution are of neither sign."""
+    least = resolution(duration)
+    surely = np.abs(rates) > least[:, None]
+    grows, shrinks = surely & (rates > 0.0), surely & (rates < 0.0)
+    counted = np.isfinite(rates) & ~(shrinks & grows.any(axis=1)[:, None])
+    count = counted.sum(axis=1)
+    enough = np.where(count < FEWEST, np.nan, count)
+    mean = np.where(counted, rates, 0.0).sum(axis=1) / enough
+    scatter = np.sqrt((np.where(counted, rates - mean[:, None], 0.0) ** 2).sum(axis=1) / (enough - 1.0))
+    error = stdtrit(enough - 1.0, 0.975) * scatter / np.sqrt(enough)
+    with np.errstate(invalid="ignore"):
+        return Largest(mean, error, least, mean - error > least, mean + error < -least)

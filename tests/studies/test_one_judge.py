@@ -1,0 +1,77 @@
+"""One motion gets one verdict, by whichever of the four doors it is asked for: `classify`, `find_attractors`, a chart, a diagram."""
+
+import numpy as np
+import pytest
+from shared_systems import forced
+
+from saltus import classify, find_attractors, stability_chart
+from saltus.flow import Ending
+from saltus.studies.diagram.diagram_work import DiagramWork
+from saltus.studies.diagram.searched_range import Begun, SearchedRange
+
+AMPLITUDE = "load.horizontal.amplitude"
+MOTIONS = {
+    Ending.PERIODIC: (forced(0.5, 1.0), 2.0),
+    Ending.CHAOTIC: (forced(3.0, 1.6), 2.0),
+    Ending.TRANSIENT: (forced(7.2, 4.0), 2.0),  # numerics.md: chaos that settles after some thousand periods
+    Ending.QUASI_PERIODIC: (
+        forced(0.002, 1.0, C=0.0, V=0.5),
+        0.02,
+    ),  # without damping, about a deformed equilibrium: KAM's curves
+}
+
+
+def by_classify(system, window):
+    theta, velocity = states_within(system, window)[0]
+    return classify(system, theta=theta, velocity=velocity, periods=600, transient=0)
+
+
+def states_within(system, window, count=6):
+    """Random states about the equilibrium near which the motion stays, or about the contact."""
+    middle = 0.03 if window < 0.1 else 0.0
+    return np.random.default_rng(1).uniform(-window, window, (count, 2)) + [middle, 0.0]
+
+
+def by_attractors(system, window):
+    middle = 0.03 if window < 0.1 else 0.0
+    bounds = ((middle - window, middle + window), (-window, window))
+    return find_attractors(system, window=bounds, starts=3)
+
+
+def by_chart(system, window):
+    middle = 0.03 if window < 0.1 else 0.0
+    bounds = ((middle - window, middle + window), (-window, window))
+    values = {"horizontal": [system.get(AMPLITUDE)], "vertical": [system.get("load.vertical")]}
+    return stability_chart(system, **values, window=bounds, starts=6).isel(horizontal=0, vertical=0)
+
+
+def by_diagram(system, window):
+    value = system.get(AMPLITUDE)
+    search = SearchedRange(DiagramWork(system, AMPLITUDE), (0.9 * value, 1.1 * value))
+    search.follow([Begun(value, states_within(system, window), care=2)])  # as bands are judged where transients are near
+    return Ending(search.tried().verdict[0])
+
+
+@pytest.mark.parametrize("expected", MOTIONS, ids=str)
+def test_four_doors_have_one_judge(expected):
+    """A transient ends on an orbit: the motion of `classify` and those of `find_attractors` are given the time to come there."""
+    system, window = MOTIONS[expected]
+    verdict, found, cell = by_classify(system, window), by_attractors(system, window), by_chart(system, window)
+    assert by_diagram(system, window) is expected
+    kinds = {member.kind for member in found} - {Ending.REST}
+    if expected is Ending.TRANSIENT:
+        assert verdict.kind is Ending.PERIODIC or verdict.cause.name == "TRANSIENT"
+        assert kinds == {Ending.PERIODIC}
+        assert Ending(int(cell["verdict"])) in (Ending.TRANSIENT, Ending.PERIODIC) and cell["count"] > 0
+    elif expected is Ending.PERIODIC:
+        assert verdict.kind is expected
+        assert kinds == {expected}
+        assert cell["unsettled"] == 0 and cell["count"] > 0
+    else:
+        assert verdict.kind is expected
+        assert Ending(int(cell["verdict"])) is expected
+        if expected is Ending.CHAOTIC:
+            assert kinds == {expected}
+        else:  # nothing attracts without damping
+            assert not kinds
+            assert all("quasi-periodic, but areas do not shrink" in reason for reason in found.reasons)
