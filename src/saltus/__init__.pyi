@@ -17,7 +17,7 @@ from .bounds import capture_speed
 from .branch_tables import branch_of
 from .config import load, load_study, to_mat
 from .errors import MotionError, ParameterError, SaltusError, SweepError, TraceError
-from .flow import EventKind, Motion, Sensitivities, Stop, sensitivities, simulate, simulate_many, stop_names
+from .flow import Ending, EventKind, Motion, Sensitivities, Stop, sensitivities, simulate, simulate_many, stop_names
 from .orbits import (
     Branch,
     FreeOrbit,
@@ -78,6 +78,7 @@ __all__ = [
     "Branch",
     "Chirp",
     "Contact",
+    "Ending",
     "EnergyRestitution",
     "EventKind",
     "Exponents",

@@ -1,4 +1,4 @@
-"""One motion gets one verdict, by whichever of the four doors it is asked for: `classify`, `find_attractors`, a chart, a diagram."""
+"""One motion gets one verdict from all four doors: `classify`, `find_attractors`, a chart and a diagram."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def by_classify(system, window):
 def states_within(system, window, count=6):
     """Random states about the equilibrium near which the motion stays, or about the contact."""
     middle = 0.03 if window < 0.1 else 0.0
-    return np.random.default_rng(1).uniform(-window, window, (count, 2)) + [middle, 0.0]
+    return np.random.default_rng(1).uniform(-window, window, (count, 2)) + np.array([middle, 0.0])
 
 
 def by_attractors(system, window):
@@ -62,11 +62,13 @@ def test_four_doors_have_one_judge(expected):
     if expected is Ending.TRANSIENT:
         assert verdict.kind is Ending.PERIODIC or verdict.cause.name == "TRANSIENT"
         assert kinds == {Ending.PERIODIC}
-        assert Ending(int(cell["verdict"])) in (Ending.TRANSIENT, Ending.PERIODIC) and cell["count"] > 0
+        assert Ending(int(cell["verdict"])) in (Ending.TRANSIENT, Ending.PERIODIC)
+        assert cell["count"] > 0
     elif expected is Ending.PERIODIC:
         assert verdict.kind is expected
         assert kinds == {expected}
-        assert cell["unsettled"] == 0 and cell["count"] > 0
+        assert cell["unsettled"] == 0
+        assert cell["count"] > 0
     else:
         assert verdict.kind is expected
         assert Ending(int(cell["verdict"])) is expected
