@@ -10,7 +10,7 @@ from picture_checks import check_provenance, clipped
 
 from saltus.attractors import lyapunov_many
 from saltus.files import write_dataset
-from saltus.flow import find_recurrence
+from saltus.flow import Ending, find_recurrence
 from saltus.orbits import find_orbit, follow_stable, search_orbits
 from saltus.plots import figure_of
 from saltus.plots.chart import draw_stability_chart
@@ -195,7 +195,7 @@ def early_chaos(periods):
     found = lyapunov_many(
         under_force().with_(EARLY), theta=np.array([0.2, 0.3, -0.25, 0.35]), velocity=0.05, periods=periods, transient=300
     )
-    moving = found["ending"].values == 0
+    moving = ~np.isin(found["ending"].values, (Ending.REST, Ending.ENDED))
     states = np.stack([found["end_theta"].values, found["end_velocity"].values], axis=1)
     return found["exponent"].values[moving, 0], found["error"].values[moving, 0], states[moving]
 

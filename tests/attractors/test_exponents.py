@@ -217,7 +217,7 @@ def test_rest_with_a_loss_at_impacts_leaves_nothing():
     assert "rests at contact" in found.note
     many = lyapunov_many(forced(0.05, 0.5), {"impact.e": [0.5, 1.0]}, theta=0.1, periods=32, transient=100)
     assert np.isneginf(many.exponent[0]).all()
-    assert (many.ending == 1).all()
+    assert (many.ending == Ending.REST).all()
 
 
 def test_impacts_that_lose_nothing_have_no_exponents_at_rest():
