@@ -16,6 +16,7 @@ from saltus import ParameterError
 from saltus.attractors import lyapunov_many, lyapunov_spectrum
 from saltus.attractors.lyapunov.averages import LYAPUNOV, span_count
 from saltus.attractors.lyapunov.spectrum import Contraction, impact_factor
+from saltus.flow import Ending
 from saltus.theory import equilibria
 
 
