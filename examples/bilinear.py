@@ -16,7 +16,7 @@ import saltus
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bilinear(saltus.Model):
+class Bilinear(saltus.OneContactModel):
     """side +1 where x > 0, side -1 where x < 0; nothing jumps at x = 0 but the stiffness."""
 
     stiff: float = 4.0  # K

@@ -23,11 +23,6 @@ class Duffing(saltus.Model):
     coordinates: ClassVar[tuple[str, ...]] = ("x",)
     channels: ClassVar[tuple[str, ...]] = ("force",)
 
-    @property
-    def sides(self):
-        """No contact, no sides."""
-        return ()
-
     def acceleration(self, t, x, velocity, side, load):
         """x''."""
         return load.force(t) - self.damping * velocity - x - self.cubic * x**3

@@ -15,6 +15,7 @@ from saltus import (
     Load,
     Metainterface,
     Model,
+    OneContactModel,
     RockingBlock,
     System,
     VelocityReduction,
@@ -95,7 +96,7 @@ def rocking(a=1.5, W=5.0, alpha=0.25):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Hinge(Model):
+class Hinge(OneContactModel):
     """A user's model: a cubic spring and a bias s f at x = `edge`, which the motion goes through, the gap in units of its own."""
 
     edge: float = 0.4
@@ -137,7 +138,6 @@ class Pair(Model):
 
     coordinates: ClassVar[tuple[str, ...]] = ("x", "y")
     channels: ClassVar[tuple[str, ...]] = ("force",)
-    sides: ClassVar[tuple[int, ...]] = ()
 
     def acceleration(self, t, position, velocity, side, load):
         (x, y), (u, v) = position, velocity

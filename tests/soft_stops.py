@@ -8,11 +8,11 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from saltus.systems import Harmonic, Load, Model, System, VelocityReduction
+from saltus.systems import Harmonic, Load, OneContactModel, System, VelocityReduction
 
 
 @dataclass(frozen=True, kw_only=True)
-class SoftStop(Model):
+class SoftStop(OneContactModel):
     """x'' = force - c x' - k x, and beyond x = edge less: stop (x - edge) + damper x' + preload."""
 
     stiffness: float = 1.0

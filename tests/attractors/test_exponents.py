@@ -44,10 +44,6 @@ class Chain(saltus.Model):
     coordinates = ("left", "right")
     channels = ("force",)
 
-    @property
-    def sides(self):
-        return ()
-
     def acceleration(self, t, q, v, side, load):
         pull = self.stiffness * (q[1] - q[0]) + self.between * (v[1] - v[0])
         return load.force(t) - q[0] + pull - self.damping * v[0], -pull - q[1] - self.damping * v[1]

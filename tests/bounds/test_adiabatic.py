@@ -9,12 +9,12 @@ import pytest
 from saltus.bounds.adiabatic_invariant import budget, normal_form
 from saltus.bounds.gap_equation import Leaves, Opening
 from saltus.bounds.intervals import Interval
-from saltus.systems import Harmonic, Load, Model, System
+from saltus.systems import Harmonic, Load, OneContactModel, System
 from saltus.taylor.tracing import trace
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bent(Model):
+class Bent(OneContactModel):
     """Two sides with every term that the normal form knows: w'' = -pull - c w' - k w - d w'^2 - g w w' - n w^2 - p w'^3."""
 
     pull: tuple[float, float]

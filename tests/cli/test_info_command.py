@@ -109,10 +109,10 @@ def test_the_wall_oscillator(info):
 
 OWN = """
 from dataclasses import dataclass
-from saltus.systems import Model
+from saltus.systems import OneContactModel
 
 @dataclass(frozen=True, kw_only=True)
-class Own(Model):
+class Own(OneContactModel):
     stiffness: float
     channels = ("force",)
 

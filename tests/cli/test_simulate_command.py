@@ -164,7 +164,7 @@ def test_the_example_model_is_also_a_script():
 def test_an_operation_that_cannot_be_traced_is_refused(refused, study, tmp_path):
     (tmp_path / "own.py").write_text(
         "from dataclasses import dataclass\nimport numpy as np\nfrom saltus.systems import Model\n\n"
-        "@dataclass(frozen=True)\nclass Own(Model):\n    sides = ()\n"
+        "@dataclass(frozen=True)\nclass Own(Model):\n"
         "    def acceleration(self, t, theta, velocity, side, load):\n        return -np.floor(theta)\n"
     )
     path = study('[model]\ntype = "own.py:Own"\n[simulate]\nduration = 1\n')

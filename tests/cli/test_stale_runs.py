@@ -7,11 +7,11 @@ from saltus.sweep import open_store
 
 MODEL = """
 from dataclasses import dataclass
-from saltus.systems import Model
+from saltus.systems import OneContactModel
 STIFFNESS = 1.0
 
 @dataclass(frozen=True, kw_only=True)
-class Hinged(Model):
+class Hinged(OneContactModel):
     damping: float = 0.3
     coordinates = ("x",)
     channels = ("force",)

@@ -161,10 +161,6 @@ class Duffing(Model):
     tilt: float = field(default=0.0, metadata={"unit": "rad"})
     channels = ("force",)
 
-    @property
-    def sides(self):
-        return ()
-
     def acceleration(self, t, theta, velocity, side, load):
         return load.force(t) - theta - self.cubic * theta**3
 """

@@ -17,6 +17,7 @@ from saltus.systems import (
     Load,
     Metainterface,
     Model,
+    OneContactModel,
     Record,
     RockingBlock,
     System,
@@ -42,14 +43,13 @@ class Duffing(Model):
     cubic: float = 1.0
     coordinates: ClassVar[tuple[str, ...]] = ("x",)
     channels: ClassVar[tuple[str, ...]] = ("force",)
-    sides: ClassVar[tuple[int, ...]] = ()
 
     def acceleration(self, t, x, velocity, side, load):
         return load.force(t) - self.damping * velocity - x - self.cubic * x**3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Curved(Model):
+class Curved(OneContactModel):
     """Every function that a model may use: tanh, exp, log, sqrt, tan, pow, sin, cos and division; it crosses x = 0.
 
     x'' = F - c tanh(x') - s p sqrt(4 + x^2) - x^3 exp(-x^2) - tan(x/10) (2 + cos x)^n / (4 + x^2) + log(5 + x^2) sin(x/2) / 10.

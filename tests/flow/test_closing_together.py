@@ -8,11 +8,11 @@ import pytest
 
 import saltus
 from saltus.flow import EventKind
-from saltus.systems import Contact, Harmonic, Load, Model, NewtonImpact, System
+from saltus.systems import Contact, ContactModel, Harmonic, Load, NewtonImpact, System
 
 
 @dataclass(frozen=True, kw_only=True)
-class Row(Model):
+class Row(ContactModel):
     """Masses in a row, each above a wall of its own, with springs and dampers between neighbours."""
 
     stiffness: float = 0.4
@@ -23,7 +23,6 @@ class Row(Model):
 
     coordinates: ClassVar[tuple[str, ...]] = ("x_1", "x_2", "x_3")
     channels: ClassVar[tuple[str, ...]] = ("force",)
-    sides: ClassVar[tuple[int, ...]] = ()
 
     @property
     def contacts(self):

@@ -132,13 +132,12 @@ def test_complementarity_on_random_systems(seed: int) -> None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class TwoRubbed(saltus.Model):
+class TwoRubbed(saltus.ContactModel):
     """Two masses in each other, [[2, 1], [1, 2]] q'' = r, each rubbed by ground of its own."""
 
     mu: float = 0.3
     coordinates: ClassVar[tuple[str, ...]] = ("x", "y")
     channels: ClassVar[tuple[str, ...]] = ("force",)
-    sides: ClassVar[tuple[int, ...]] = ()
 
     @property
     def frictions(self) -> tuple[saltus.Friction, ...]:
@@ -290,11 +289,10 @@ def test_a_normal_force_that_vanishes_ends_the_motion_by_its_name() -> None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rubbed(saltus.Model):
+class Rubbed(saltus.ContactModel):
     """x'' = -x with whatever frictions it is given."""
 
     given: ClassVar[tuple[saltus.Friction, ...]] = ()
-    sides: ClassVar[tuple[int, ...]] = ()
     coordinates: ClassVar[tuple[str, ...]] = ("x",)
 
     @property

@@ -25,10 +25,6 @@ class Odd(Model):
     septic: float = 0.0
     coordinates: ClassVar[tuple[str, ...]] = ("x",)
 
-    @property
-    def sides(self):
-        return ()
-
     def acceleration(self, t, x, velocity, side, load):
         return -self.linear * x - self.cubic * x**3 - self.quintic * x**5 - self.septic * x**7
 
@@ -40,10 +36,6 @@ class Pair(Model):
     rate: float = 1.0
     coordinates: ClassVar[tuple[str, ...]] = ("x", "y")
     channels: ClassVar[tuple[str, ...]] = ("force",)
-
-    @property
-    def sides(self):
-        return ()
 
     def acceleration(self, t, q, velocity, side, load):
         return load.force(t) - self.rate**2 * q[0], -(q[1] ** 3)

@@ -49,7 +49,7 @@ def states_of(system, n=24):
         gaps = {side: float(model.gap(place, side)) for side in model.sides} if own == 1 else {}
         inside = [side for side, gap in gaps.items() if gap > 0]
         beyond = any(c.sign * (position[model.coordinates.index(c.coordinate)] - c.position) <= 0 for c in model.contacts)
-        if (gaps and not inside) or (model.held and beyond):
+        if (gaps and not inside) or (model.holds_coordinates and beyond):
             continue
         side = inside[0] if inside else 1
         acceleration = model.acceleration(0.0, place, speed, side, system.load)

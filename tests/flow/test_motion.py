@@ -27,7 +27,6 @@ class Runaway(Model):
 
     coordinates: ClassVar[tuple[str, ...]] = ("x",)
     channels: ClassVar[tuple[str, ...]] = ("force",)
-    sides: ClassVar[tuple[int, ...]] = ()
 
     def acceleration(self, t, x, velocity, side, load):
         return x + load.force(t)

@@ -10,13 +10,13 @@ import pytest
 from saltus.errors import ParameterError, SaltusError
 from saltus.flow import simulate
 from saltus.flow.kernel.structures import _structures
-from saltus.systems import Harmonic, Load, Model, System, VelocityReduction, WallOscillator
+from saltus.systems import Harmonic, Load, Model, OneContactModel, System, VelocityReduction, WallOscillator
 from saltus.systems.registry import MODELS, register
 from saltus.taylor.cache import cache_directory
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Bilinear(Model):
+class Bilinear(OneContactModel):
     """x'' + c_s x' + k_s x = wind + gust, with one spring and one damper on each side; it crosses x = 0 with v+ = e v-."""
 
     left: float
@@ -40,7 +40,6 @@ class Pair(Model):
 
     coordinates: ClassVar[tuple[str, ...]] = ("x", "y")
     channels: ClassVar[tuple[str, ...]] = ("force",)
-    sides: ClassVar[tuple[int, ...]] = ()
 
     def acceleration(self, t, position, velocity, side, load):
         x, y = position
@@ -143,7 +142,6 @@ class Tabulated(Model):
 
     factors: np.ndarray
     coordinates: ClassVar[tuple[str, ...]] = ("x",)
-    sides: ClassVar[tuple[int, ...]] = ()
 
     def acceleration(self, t, x, velocity, side, load):
         return sum(-float(f) * x ** (n + 1) for n, f in enumerate(self.factors))
@@ -189,7 +187,7 @@ def test_a_gap_that_is_linear_in_other_words_is_the_same_gap():
     assert other.impacts.time == pytest.approx(one.impacts.time, abs=1e-9)
 
 
-class Wall(Model):
+class Wall(OneContactModel):
     """A wall at x = 0 whose reset is that of a passage."""
 
     coordinates = ("x",)

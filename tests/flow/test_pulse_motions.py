@@ -20,7 +20,7 @@ from saltus.systems import (
     Harmonic,
     Load,
     MavroeidisPapageorgiou,
-    Model,
+    OneContactModel,
     OneCosine,
     OneSine,
     Ramp,
@@ -138,7 +138,7 @@ def test_periodic_orbits_under_a_pulse_are_refused():
 
 
 @dataclass(frozen=True, kw_only=True)
-class LinearBlock(Model):
+class LinearBlock(OneContactModel):
     """A slender rocking block for small angles over its slenderness: theta'' = -zeta'' - s (1 - s theta)."""
 
     channels: ClassVar[tuple[str, ...]] = ("ground_horizontal",)

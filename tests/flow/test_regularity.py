@@ -15,7 +15,7 @@ from saltus.systems import (
     Harmonic,
     Load,
     Metainterface,
-    Model,
+    OneContactModel,
     RockingBlock,
     System,
     VelocityReduction,
@@ -39,7 +39,7 @@ class Rewritten(SoftStop):
         return load.force(t) - self.damping * velocity - pull
 
 
-class Relay(Model):
+class Relay(OneContactModel):
     """x'' = -x - sign(x): a force that jumps."""
 
     coordinates: ClassVar[tuple[str, ...]] = ("x",)
@@ -48,7 +48,7 @@ class Relay(Model):
         return -x - side
 
 
-class Smooth(Model):
+class Smooth(OneContactModel):
     """x'' = sin(1 - x) - sin(1 + x) tanh(x) / ..., the same expression on both sides in other words."""
 
     coordinates: ClassVar[tuple[str, ...]] = ("x",)

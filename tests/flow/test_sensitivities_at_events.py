@@ -229,7 +229,6 @@ class Power(Model):
 
     exponent: float = 2.5
     coordinates = ("x",)
-    sides = ()
 
     def acceleration(self, t, x, velocity, side, load):
         return -((2.0 + x) ** self.exponent)
@@ -297,7 +296,6 @@ def test_derivatives_beyond_the_range_of_numbers_are_said_to_be():
 
         rate: float = 1.0
         coordinates = ("x",)
-        sides = ()
 
         def acceleration(self, t, x, velocity, side, load):
             return self.rate * x

@@ -20,10 +20,6 @@ class Odd(Model):
     quintic: float = 0.0
     coordinates: ClassVar[tuple[str, ...]] = ("x",)
 
-    @property
-    def sides(self):
-        return ()
-
     def acceleration(self, t, x, velocity, side, load):
         return -self.linear * x - self.cubic * x**3 - self.quintic * x**5
 

@@ -20,7 +20,6 @@ class Smooth(Model):
 
     coordinates: ClassVar[tuple[str, ...]] = ("x",)
     channels: ClassVar[tuple[str, ...]] = ("push",)
-    sides: ClassVar[tuple[int, ...]] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,7 +18,7 @@ DAMPING, COUPLING, FRICTION, FREQUENCY = 0.1, 0.5, 0.2, 0.7
 
 
 @dataclass(frozen=True, kw_only=True)
-class TwoBlocks(saltus.Model):
+class TwoBlocks(saltus.ContactModel):
     """x'' = F - x - C x' - k (x - y) + f_x, and y likewise; the mirror swaps them."""
 
     damping: float = DAMPING
@@ -27,7 +27,6 @@ class TwoBlocks(saltus.Model):
 
     coordinates: ClassVar[tuple[str, ...]] = ("x", "y")
     channels: ClassVar[tuple[str, ...]] = ("force",)
-    sides: ClassVar[tuple[int, ...]] = ()
     images: ClassVar[tuple[str, ...]] = ("y", "x")
 
     @property

@@ -157,7 +157,6 @@ def test_a_torus_is_born_where_areas_may_grow():
     class VanDerPol(saltus.Model):
         coordinates = ("x",)
         channels = ("force",)
-        sides = ()
 
         def acceleration(self, t, x, velocity, side, load):
             return load.force(t) - x + 0.2 * (1 - x * x) * velocity

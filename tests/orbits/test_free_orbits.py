@@ -11,11 +11,11 @@ from saltus import theory
 from saltus.errors import MotionError, ParameterError
 from saltus.orbits import backbone, free_orbit
 from saltus.plots import draw_backbone, figure_of
-from saltus.systems import Model, System
+from saltus.systems import OneContactModel, System
 
 
 @dataclass(frozen=True, kw_only=True)
-class SlenderBlock(Model):
+class SlenderBlock(OneContactModel):
     """A rocking block of small angles: theta'' = theta - s alpha, with p = 1."""
 
     alpha: float

@@ -13,7 +13,7 @@ from saltus.flow import SegmentColumn, SegmentValue
 from saltus.flow.one_contact.segments import SHORT
 from saltus.orbits.equations.one_contact import OneContactEquations, Segments
 from saltus.orbits.signature import Signature
-from saltus.systems import Harmonic, Load, Model, System, VelocityReduction
+from saltus.systems import Harmonic, Load, OneContactModel, System, VelocityReduction
 
 STARTS = {"forced": (0.6, 0.1), "shaken": (0.5, 0.2), "walled": (0.2, 0.9), "rocking": (0.01, 0.02), "hinged": (1.2, 0.3)}
 
@@ -150,7 +150,7 @@ def test_derivatives_of_shooting_without_impacts(name, periods):
             assert (found.parameters[:, j] == 0.0).all()
 
 
-class SteepBelow(Model):
+class SteepBelow(OneContactModel):
     """x'' = force - 0.1 x' - x - push: 0.3 above the contact; below it the push turns round within 0.01 of x = -0.8."""
 
     coordinates = ("x",)

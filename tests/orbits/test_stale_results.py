@@ -9,14 +9,14 @@ import saltus
 from saltus import provenance
 from saltus.errors import ParameterError
 from saltus.orbits import orbits_of
-from saltus.systems import Harmonic, Load, Model, System, VelocityReduction, WallOscillator, register
+from saltus.systems import Harmonic, Load, OneContactModel, System, VelocityReduction, WallOscillator, register
 from saltus.taylor import equations_of
 
 STIFFNESS = 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hinged(Model):
+class Hinged(OneContactModel):
     """x'' + c x' + k x + s / 5 = force, with a constant of the module as its stiffness k."""
 
     damping: float = 0.1

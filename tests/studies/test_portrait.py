@@ -161,10 +161,6 @@ class DoubleWell(Model):
     damping: float = 0.1
     coordinates = ("x",)
 
-    @property
-    def sides(self):
-        return ()
-
     def acceleration(self, t, x, velocity, side, load):
         return x - x * x * x - self.damping * velocity
 

@@ -113,7 +113,7 @@ def admissible_roots(m, beta0, v, s, zeta, nu, r):
 
 
 @settings(deadline=None)
-@given(angle, mass, side, speed, rate, rate, st.floats(0.05, 1.5))
+@given(angle, mass, side, speed, rate, rate, st.floats(0.05, 1.0))
 @example(1.4, 0.0, 1, 0.05, 0.9, 0.3, 0.5)
 def test_erratum_26_energy_restitution_keeps_its_ratio_or_says_that_it_cannot(beta0, m, s, size, zeta, nu, r):
     """The ratio of energies is r and the sign is kept; NaN, without a warning, exactly where no root has that sign."""
@@ -229,7 +229,7 @@ def test_a_wall_turns_the_velocity_round_with_either_law():
         (lambda: VelocityReduction(-0.1), "e must"),
         (lambda: VelocityReduction(math.nan), "e must"),
         (lambda: VelocityReduction("1"), "e must be a number"),
-        (lambda: EnergyRestitution(0.0), r"r must lie in \(0, inf\), got 0.0"),
+        (lambda: EnergyRestitution(0.0), r"r must lie in \(0, 1\], got 0.0"),
         (lambda: EnergyRestitution(-1.0), "r must"),
     ],
 )

@@ -42,7 +42,6 @@ class Many(Model):
 
     coordinates: ClassVar[tuple[str, ...]] = tuple(f"x{i}" for i in range(len(NAMES) + len(OF_RECORD)))
     channels: ClassVar[tuple[str, ...]] = ("force", "pulse")
-    sides: ClassVar[tuple[int, ...]] = ()
 
     def acceleration(self, t, position, velocity, side, load):
         states = list(zip(position, velocity, strict=True))

@@ -21,6 +21,7 @@ from saltus.systems import (
     Load,
     Metainterface,
     Model,
+    OneContactModel,
     RockingBlock,
     System,
     TwoLayer,
@@ -67,7 +68,6 @@ class Many(Model):
 
     coordinates: ClassVar[tuple[str, ...]] = tuple(f"x{i}" for i in range(len(OPERATIONS)))
     channels: ClassVar[tuple[str, ...]] = ("force",)
-    sides: ClassVar[tuple[int, ...]] = ()
 
     def acceleration(self, t, position, velocity, side, load):
         states = zip(OPERATIONS.values(), position, velocity, strict=True)
@@ -80,7 +80,7 @@ def with_abs(q, v, f):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TwoSided(Model):
+class TwoSided(OneContactModel):
     """x'' = a function of abs(x), which bends at the contact."""
 
     coordinates: ClassVar[tuple[str, ...]] = ("x",)

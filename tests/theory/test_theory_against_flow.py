@@ -15,7 +15,7 @@ from saltus.systems import (
     InelasticImpact,
     Load,
     Metainterface,
-    Model,
+    OneContactModel,
     RockingBlock,
     System,
     VelocityReduction,
@@ -39,7 +39,7 @@ BETA = math.radians(80)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LinearMetainterface(Model):
+class LinearMetainterface(OneContactModel):
     """`gov_eqn_constant_loading_lin`: the reduced equation to first order in theta, with m, k, c and a constant H."""
 
     beta0: float

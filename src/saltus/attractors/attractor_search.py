@@ -95,7 +95,7 @@ class KnownAttractors:
     def _rest_state(self, last: np.ndarray) -> np.ndarray:
         """The state in which a motion with this last state rests: the contact or, with several contacts or frictions, this
         state."""
-        return last if self.system.model.held else rest_state(self.system)
+        return last if self.system.model.holds_coordinates else rest_state(self.system)
 
     def add_rest(self, state: np.ndarray) -> int:
         """The label of rest in a state (d,)."""

@@ -258,7 +258,7 @@ def _start(system: System, velocity: Any, coordinates: dict[str, float]) -> np.n
 def _settled(case: _Case, ends: Recurrence, start: np.ndarray) -> Verdict | None:
     """The verdict on a motion from a state (d,) that has come to rest, has ended or repeats itself; None if it goes on moving."""
     if ends.rest[0] or (ends.period[0] == 1 and stays_at_rest(case.clock, ends.last[0])):
-        held, numbers = case.system.model.held, {"periods": round(float(ends.periods[0]))}
+        held, numbers = case.system.model.holds_coordinates, {"periods": round(float(ends.periods[0]))}
         point = ends.last[0] if held else np.array([float(case.system.model.contact), 0.0])
         cause = Reason.STANDS if case.system.model.frictions else Reason.CAPTURED
         return case.verdict(Ending.REST, cause, ends, numbers, state=start_at(case.system, point))

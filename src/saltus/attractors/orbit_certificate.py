@@ -105,7 +105,7 @@ def solved_orbit(system: System, state: np.ndarray, period: int, admissible: boo
 
 def stays_at_rest(system: System, state: np.ndarray) -> bool:
     """Whether contacts or frictions hold a state (d,) at rest over a whole forcing period; it then stays, as the load repeats."""
-    if not system.model.held:
+    if not system.model.holds_coordinates:
         return False
     motion = simulate(system, **start_at(system, state), periods=1, dense=False)
     lets_go = (EventKind.IMPACT, EventKind.RELEASE, EventKind.SLIP)

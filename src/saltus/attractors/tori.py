@@ -50,7 +50,7 @@ def excludes_tori(system: System) -> str | None:
     """
     check_system(system, "excludes_tori", several_contacts=True)
     check_periodic(system)
-    if len(system.model.coordinates) > 1 or system.model.held:
+    if not system.model.has_state_plane:
         return None
     rate = area_contraction(system)
     continuous = None if rate is None or rate == 0.0 else _continuous(system)

@@ -22,7 +22,7 @@ def area_contraction(system: System) -> float | None:
     leaves the unit circle: there is no Neimark-Sacker bifurcation (errata 22). The rate is bounded by interval arithmetic, so
     that None does not mean that areas do grow.
     """
-    if len(system.model.coordinates) > 1 or system.model.held:
+    if not system.model.has_state_plane:
         return None
     traced = trace(system)
     leaves = leaves_over_a_period(system)

@@ -106,7 +106,7 @@ def _rocking_block(system: System, start: float | None) -> Iterator[Block]:
         ("overturning equilibria, theta = +-alpha", angle(alpha)),
         ("the block lies on its side at +-pi/2", angle(math.pi / 2)),
         ("rest is left where |zeta''| exceeds (1 + nu'') tan(alpha)", number(math.tan(alpha))),
-        ("velocity factor of an inelastic impact (Housner)", number(system.model.inelastic_factor(1))),
+        ("velocity factor of an inelastic impact (Housner)", number(system.one_contact.inelastic_factor(1))),
     ]
     yield Block("Closed forms", [*rows, *_rocking_periods(alpha, start or alpha / 2)])
 

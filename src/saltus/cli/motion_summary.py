@@ -40,7 +40,9 @@ def _state(motion: Motion) -> list[tuple[str, str]]:
 
 
 def _events(motion: Motion) -> list[tuple[str, str]]:
-    if not (motion.system.model.sides or motion.system.model.held):  # a model without contacts and frictions
+    if not (
+        motion.system.model.has_one_contact or motion.system.model.holds_coordinates
+    ):  # a model without contacts and frictions
         return []
     impacts = motion.impacts
     last = (

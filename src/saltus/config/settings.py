@@ -30,11 +30,7 @@ def read_settings(source: Source, system: System, data: Any) -> Settings:
 
 def margin_names(system: System) -> tuple[str, ...]:
     """The margins of the system's model, at which a motion may be asked to stop."""
-    count = len(system.model.coordinates)
-    state: Any = 0.1 if count == 1 else (0.1,) * count
-    rest: Any = 0.0 if count == 1 else (0.0,) * count
-    side = (*system.model.sides, 1)[0]
-    return tuple(system.model.margins(0.0, state, rest, rest, side, system.load))
+    return system.model.margin_names(system.load)
 
 
 def _check_horizon(source: Source, system: System, values: Mapping[str, Any]) -> None:

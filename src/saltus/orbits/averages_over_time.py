@@ -16,7 +16,7 @@ from saltus.orbits.equations.resting import RestingOrbit
 from saltus.orbits.free_orbits import FreeOrbit
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.public_functions import answered
-from saltus.systems import Model, System
+from saltus.systems import ContactModel, Model, System
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(
     16
@@ -185,7 +185,7 @@ def _round(orbit: PeriodicOrbit | FreeOrbit) -> tuple[Motion, float, float]:
 
 
 def _has_matrix(model: Model) -> bool:
-    return type(model).force is not Model.force
+    return isinstance(model, ContactModel)
 
 
 def _damping_power(course: _Course) -> Any:
@@ -194,7 +194,10 @@ def _damping_power(course: _Course) -> Any:
     if _has_matrix(model):
         q, v = (tuple(x) if len(x) > 1 else x[0] for x in (course.position, course.velocity))
         back = tuple(-x for x in v) if isinstance(v, tuple) else -v
-        ahead, behind = (np.atleast_2d(np.array(_rows(model.force(course.time, q, w, load), course.time))) for w in (v, back))
+        ahead, behind = (
+            np.atleast_2d(np.array(_rows(course.system.contact_model.force(course.time, q, w, load), course.time)))
+            for w in (v, back)
+        )
         return np.sum(course.velocity * (ahead - behind) / 2, axis=0)
     q, v, side = course.position[0], course.velocity[0], np.where(course.side == 0, 1.0, course.side)
     odd = (model.acceleration(course.time, q, v, side, load) - model.acceleration(course.time, q, -v, side, load)) / 2
@@ -207,7 +210,7 @@ def _friction_power(course: _Course) -> Any:
     if not model.frictions:
         return taken
     q, v = (tuple(x) if len(x) > 1 else x[0] for x in (course.position, course.velocity))
-    forces = model.normal_forces(course.time, q, v, course.system.load)
+    forces = course.system.contact_model.normal_forces(course.time, q, v, course.system.load)
     for friction, normal in zip(model.frictions, forces, strict=True):
         sliding = course.velocity[model.coordinates.index(friction.coordinate)] - friction.ground_speed
         taken = taken + friction.kinetic * normal * np.abs(sliding)
@@ -228,18 +231,20 @@ def _mass(course: _Course, time: Any, q: Any, side: Any) -> Any:
 
 def _impact_losses(course: _Course) -> float:
     """The energy that all impacts dissipate."""
-    model, impacts = course.system.model, course.motion.impacts
+    system, impacts = course.system, course.motion.impacts
     late = (impacts.time > course.begin) & (impacts.time <= course.end)
     if not late.any():
         return 0.0
     before, after, times = impacts.velocity_before[late], impacts.velocity_after[late], impacts.time[late]
-    if _has_matrix(model):
-        places = course.motion._states(times)[0].T
+    if _has_matrix(system.model):
+        places, model = course.motion._states(times)[0].T, system.contact_model
         matrices = [np.atleast_2d(np.array(model.mass_matrix(tuple(q) if len(q) > 1 else q[0]), dtype=float)) for q in places]
         pairs = zip(np.reshape(before, places.shape), np.reshape(after, places.shape), matrices, strict=True)
         return float(sum(0.5 * (v @ m @ v - w @ m @ w) for v, w, m in pairs))
-    load, impact, side = course.system.load, course.system.impact, impacts.side[late].astype(float)
-    beyond = np.array([model.reset(t, v, s, load, impact)[0] for t, v, s in zip(times, before, side, strict=True)], dtype=float)
-    contact = float(model.contact)
+    load, impact, side = system.load, system.impact, impacts.side[late].astype(float)
+    beyond = np.array(
+        [system.one_contact.reset(t, v, s, load, impact)[0] for t, v, s in zip(times, before, side, strict=True)], dtype=float
+    )
+    contact = float(system.model.contact)
     first, second = (_mass(course, times, contact, s) for s in (side, beyond))
     return float(np.sum(0.5 * (first * before**2 - second * after**2)))

@@ -243,10 +243,9 @@ class PeriodicOrbit(Result):
             return {**start_at(self.system, state), "time": time}
         if not self.signature.sides:
             return start_at(self.system, self.solution.unknowns)
-        model, load, impact = self.system.model, self.system.load, self.system.impact
+        model, load, impact = self.system.one_contact, self.system.load, self.system.impact
         side, time = int(self.sides[0]), float(self.impact_times[0])
-        inward = -np.sign(float(model.gap(model.contact + 1.0, side)) - float(model.gap(model.contact, side)))
-        _, after = model.reset(time, float(inward * self.speeds[0]), side, load, impact)
+        _, after = model.reset(time, -model.inward(side) * float(self.speeds[0]), side, load, impact)
         return {model.coordinates[0]: float(model.contact), "velocity": float(after), "time": time}
 
     def motion(self, periods: float | None = None, tol: float = 1e-13) -> Motion:

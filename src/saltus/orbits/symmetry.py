@@ -97,7 +97,7 @@ def half(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
         both = equations.halves(unknowns, orbit.solution.evaluation)
         if both is None or np.abs(both[1] - both[0]).max() > TOLERANCES.halves:
             return None
-    elif signature.closed or (equations.system.model.sides and not equations.passes_contact):
+    elif signature.closed or (equations.system.model.has_one_contact and not equations.passes_contact):
         return None
     short = equations.with_signature(replace(signature, sides=signature.sides[:n], events=signature.events[:n], symmetric=True))
     found = PeriodicOrbit.near(short, unknowns[: short.size], orbit.solution.values)

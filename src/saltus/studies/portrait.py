@@ -118,7 +118,7 @@ def _spread(system: System, window: Box, points: tuple[Equilibrium, ...], seed: 
     area, tried = check_window(window, system), PORTRAIT_STARTS.tried * PORTRAIT_STARTS.spread
     shifts = np.arange(1, tried + 1)[:, None] * even_steps(2)
     states = area.centre + area.half * (2.0 * ((np.random.default_rng(int(seed)).random(2) + shifts) % 1.0) - 1.0)
-    states = states[_possible(system, states[:, 0])][: PORTRAIT_STARTS.spread]
+    states = states[system.model.reaches(system.model.coordinates[0], states[:, 0])][: PORTRAIT_STARTS.spread]
     if not len(states):
         raise ParameterError(
             f"window must reach to where the system can be, got {window!r}: all of it is beyond the contact", "window"
@@ -134,19 +134,12 @@ def _beside(place: float, ends: list[float], share: float) -> float:
     return place + share * (nearest - place)
 
 
-def _possible(system: System, places: np.ndarray) -> np.ndarray:
-    """Which coordinates lie inside a side, where the gap is positive."""
-    model = system.model
-    sides = [np.asarray(model.gap(places, side)) > 0.0 for side in model.sides]
-    return np.any(sides, axis=0) if sides else np.ones(len(places), dtype=bool)
-
-
 def _states(system: System, starts: Any) -> np.ndarray:
     """The given states (n, 2), checked."""
     states = check_states("starts", starts)
     if not len(states):
         raise ParameterError("starts must be states (coordinate, velocity), such as [[0.3, 0.0]], and there is none", "starts")
-    beyond = states[~(_possible(system, states[:, 0]) | (states[:, 0] == float(system.model.contact)))]
+    beyond = states[~system.model.reaches(system.model.coordinates[0], states[:, 0])]
     if len(beyond):
         raise ParameterError(f"starts must lie where the system can be, and {beyond[0].tolist()} is beyond the contact", "starts")
     return states
@@ -154,7 +147,7 @@ def _states(system: System, starts: Any) -> np.ndarray:
 
 def _no_inverse(system: System) -> str:
     """Why motions cannot be followed backward through impacts; an empty text if they can."""
-    if not system.model.sides or (isinstance(system.impact, VelocityReduction) and system.impact.e > 0.0):
+    if not system.model.has_one_contact or (isinstance(system.impact, VelocityReduction) and system.impact.e > 0.0):
         return ""
     return f"{type(system.impact).__name__} cannot be followed backward"
 
@@ -197,7 +190,7 @@ def _dataset(
         "separatrix_velocity": (curve, lines[:, 1], unit, "velocity on them"),
         "equilibrium": (("equilibrium",), places.astype(float), unit, f"{name} of the equilibria"),
     }
-    contact: dict[str, Any] = {"contact": float(system.model.contact)} if system.model.sides else {}
+    contact: dict[str, Any] = {"contact": float(system.model.contact)} if system.model.has_one_contact else {}
     title = "phase portrait computed by saltus"
     attributes = provenance(system, title=title, kind="phase_portrait", coordinate=name, **contact, **facts)
     data = {key: (dims, values, {"units": units, "long_name": text}) for key, (dims, values, units, text) in columns.items()}

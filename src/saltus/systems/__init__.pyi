@@ -1,16 +1,31 @@
 from .belt_oscillator import BeltOscillator
 from .cell_chain import CellChain, FourCells, ThreeCells, TwoCells
 from .cell_layout import CellLayout
-from .constrained import apart, constrained_acceleration, mass_and_force, normal_forces, reactions, stick_margins
-from .contact import Contact
-from .friction import Friction
-from .impact import EnergyRestitution, ImpactLaw, InelasticImpact, VelocityReduction
+from .contact import Contact, Friction
+from .contact_model import (
+    ContactModel,
+    apart,
+    constrained_acceleration,
+    mass_and_force,
+    normal_forces,
+    reactions,
+    stick_margins,
+)
+from .impact_laws import (
+    EnergyRestitution,
+    ImpactLaw,
+    InelasticImpact,
+    NewtonImpact,
+    VelocityReduction,
+    energy_gain,
+    energy_gains,
+)
 from .impact_pair import ImpactPair
-from .load import Channel, Load
+from .load import Channel, DeclaredLoad, Load
 from .metainterface import Metainterface
 from .mirror import contact_images, image_of
 from .model import MarginKind, Model
-from .newton_impact import NewtonImpact, energy_gain, energy_gains
+from .one_contact_model import OneContactModel
 from .parameter_tables import broadcast_arrays, check_parameters, distinct_rows, finite_array, parameter_table
 from .parameters import children, is_number, numbers, substitute
 from .pulse import Pulse
@@ -38,6 +53,8 @@ __all__ = [
     "Chirp",
     "Constant",
     "Contact",
+    "ContactModel",
+    "DeclaredLoad",
     "EnergyRestitution",
     "FourCells",
     "Friction",
@@ -54,6 +71,7 @@ __all__ = [
     "Model",
     "NamedImpact",
     "NewtonImpact",
+    "OneContactModel",
     "OneCosine",
     "OneSine",
     "PhysicalCell",

@@ -7,13 +7,13 @@ from typing import Any, ClassVar
 
 from saltus.checks import settle_numbers
 from saltus.errors import ParameterError
-from saltus.systems.friction import Friction
+from saltus.systems.contact import Friction
+from saltus.systems.contact_model import ContactModel
 from saltus.systems.load import Load, reversed_load
-from saltus.systems.model import Model
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BeltOscillator(Model):
+class BeltOscillator(ContactModel):
     """x'' + c x' + k x = F(tau) + f, a mass pressed with N(tau) on a belt of speed w; the friction f (named `belt`) is
 
         f = -mu_k N sign(x' - w) while it slides,    abs(f) <= mu_s N while it sticks, x' = w.
@@ -58,11 +58,6 @@ class BeltOscillator(Model):
         settle_numbers(self, "belt_speed")
         if self.static < self.kinetic:
             raise ParameterError(f"static must be at least kinetic = {self.kinetic:g}, got {self.static:g}", "static")
-
-    @property
-    def sides(self) -> tuple[int, ...]:
-        """No sides, as it has a friction."""
-        return ()
 
     @property
     def frictions(self) -> tuple[Friction, ...]:

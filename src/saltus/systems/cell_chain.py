@@ -12,6 +12,7 @@ import numpy as np
 
 from saltus.checks import settle_numbers
 from saltus.systems.contact import Contact
+from saltus.systems.contact_model import ContactModel
 from saltus.systems.layered_cell import LayeredCell
 from saltus.systems.load import Load
 from saltus.systems.model import MarginKind
@@ -23,7 +24,7 @@ def _names(cells: int) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CellChain(LayeredCell):
+class CellChain(LayeredCell, ContactModel):
     """Cells side by side, each a `TwoLayer` with the same numbers and loads; its subclasses have two, three or four cells.
 
     Long horizontal springs join each mass to that of the same layer in the neighbouring cell: with the displacements

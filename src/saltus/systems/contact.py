@@ -1,4 +1,4 @@
-"""A contact of a model with several: the gap of one coordinate."""
+"""What may hold a coordinate of a model: a contact, or a dry friction."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from saltus.errors import ParameterError
 
-MOST = 12  # The most contacts: which of them are closed is found by trying, with 2^n choices at worst.
+Number = Any  # a float, or a parameter of the model while its equations are traced
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,27 +60,45 @@ class Contact:
         return self.sign * (position - self.position)
 
 
-def check_contacts(model: Any) -> None:
-    """Refuse contacts of a model that have no meaning.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Friction:
+    """Coulomb friction along a coordinate q on a ground that moves with the speed w, under the normal force N of the model:
 
-    Raises
-    ------
-    ParameterError
-        Two contacts of one name, an unknown coordinate, a model with sides, two contacts that leave a coordinate no room.
+        it slides, and the force on q is -mu_k N sign(q' - w), or it sticks, q' = w, and the force is at most mu_s N.
+
+    N is the model's `normal_forces`, a function of time, state and load, but not of accelerations.
+
+    Parameters
+    ----------
+    name
+        Its name, such as "belt", in events.
+    coordinate
+        The name of the model's coordinate.
+    kinetic
+        mu_k, a number, which may be one of the model's parameters.
+    static
+        mu_s, at least mu_k; by default mu_k.
+    ground_speed
+        w, the speed of the ground.
+
+    Examples
+    --------
+    >>> saltus.Friction(name="belt", coordinate="x", kinetic=0.2, static=0.3, ground_speed=0.5).static
+    0.3
     """
-    contacts, kind = model.contacts, type(model).__name__
-    names = [contact.name for contact in contacts]
-    if len(contacts) > MOST:
-        raise ParameterError(f"{kind} has {len(contacts)} contacts, and at most {MOST} can be followed", "model")
-    if len(set(names)) < len(names):
-        raise ParameterError(f"{kind}.contacts must have names of their own, got {', '.join(names)}", "model")
-    if model.sides:
-        raise ParameterError(f"{kind} has contacts, so it must have no sides: give it `sides = ()`", "model")
-    for contact in contacts:
-        if contact.coordinate not in model.coordinates:
-            known = ", ".join(model.coordinates)
-            raise ParameterError(f"the contact {contact.name!r} holds {contact.coordinate!r}, but {kind} has {known}", "model")
-    for a in contacts:
-        for b in contacts:
-            if a is not b and a.coordinate == b.coordinate and not (a.sign != b.sign and b.gap(a.position) > 0.0):
-                raise ParameterError(f"the contacts {a.name!r} and {b.name!r} leave {a.coordinate} no room between them", "model")
+
+    name: str
+    coordinate: str
+    kinetic: Number
+    static: Number | None = None
+    ground_speed: Number = 0.0
+
+    @property
+    def limit(self) -> str:
+        """The name of the limit at which a motion ends, as the normal force does not press any more."""
+        return f"normal force of {self.name}"
+
+    @property
+    def most(self) -> Any:
+        """mu_s."""
+        return self.kinetic if self.static is None else self.static

@@ -7,12 +7,12 @@ from typing import Any, ClassVar
 
 from saltus.checks import settle_numbers
 from saltus.systems.contact import Contact
+from saltus.systems.contact_model import ContactModel
 from saltus.systems.load import Load, reversed_load
-from saltus.systems.model import Model
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ImpactPair(Model):
+class ImpactPair(ContactModel):
     """An impact damper: a case on a spring, at z, and a mass in it at the distance x from the case's middle, |x| <= d:
 
         z'' + c z' + k z + mu (z'' + x'') = F(tau),    mu (z'' + x'') = 0 while no wall pushes.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from saltus.checks import check_number
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, TraceError, near
 from saltus.systems.signals import Record, Signal, as_signal, scaled
 
 
@@ -131,6 +131,19 @@ class Load:
     def period(self) -> float | None:
         """The forcing period 2 pi / Omega, or None for a load without a base frequency."""
         return None if self.frequency is None else 2.0 * math.pi / self.frequency
+
+
+class DeclaredLoad:
+    """A load as its model may read it: it has only the channels that the model declares, and a misspelt name is not read as 0."""
+
+    def __init__(self, load: Any, model: Any) -> None:
+        self._load, self._model = load, model
+
+    def __getattr__(self, name: str) -> Any:
+        channels = self._model.channels
+        if name not in (*channels, "frequency", "period"):
+            raise TraceError(f"{type(self._model).__name__} reads load.{name}, not one of its channels; {near(name, channels)}")
+        return getattr(self._load, name)
 
 
 def _check_quantity(name: str, signal: Signal) -> None:

@@ -13,11 +13,12 @@ from saltus.errors import ParameterError
 from saltus.systems.layered_cell import LayeredCell
 from saltus.systems.load import Load, reversed_load
 from saltus.systems.model import MarginKind
+from saltus.systems.one_contact_model import OneContactModel
 from saltus.systems.signals import Constant, Signal, scaled, vanishes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Metainterface(LayeredCell):
+class Metainterface(LayeredCell, OneContactModel):
     """The single-degree-of-freedom metainterface (paper, `gov_eqn_theta_long`).
 
     theta > 0 is the lower layer open (side s = +1, P = 1), theta < 0 the upper one (s = -1, P = 0); dimensionless time tau:

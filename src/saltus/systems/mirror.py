@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import ParameterError
-from saltus.systems.constrained import normal_forces
-from saltus.systems.impact import ImpactLaw
+from saltus.systems.contact_model import normal_forces
+from saltus.systems.impact_laws import ImpactLaw
 from saltus.systems.model import Model
 
 PROBE = (0.3711, 0.2931, 0.6173)  # An arbitrary time, gap and velocity, at which equations that differ have different values.
@@ -61,7 +61,7 @@ def check_mirror(system: Any, mirrored: Any, side: int) -> None:
     model, (t, distance, v) = system.model, PROBE
     count, places = len(model.coordinates), image_places(model)
     if count == 1:
-        into = 1.0 if not model.sides or model.gap(model.contact + 1.0, side) > 0.0 else -1.0
+        into = model.inward(side) if model.sides else 1.0
         at = [model.contact + into * distance]
     else:
         at = [distance / (1 + i) for i in range(count)]

@@ -9,7 +9,7 @@ from functools import cache
 from typing import Any
 
 from saltus.errors import ParameterError, near, shown
-from saltus.systems.factors import Factors
+from saltus.systems.impact_laws import Factors
 from saltus.systems.load import Load
 from saltus.systems.signals import Constant, Sum, as_signal
 

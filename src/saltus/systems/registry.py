@@ -7,11 +7,11 @@ from typing import Any, TypeVar
 from saltus.errors import ParameterError, near, shown
 from saltus.systems.belt_oscillator import BeltOscillator
 from saltus.systems.cell_chain import FourCells, ThreeCells, TwoCells
-from saltus.systems.impact import EnergyRestitution, ImpactLaw, InelasticImpact, VelocityReduction
+from saltus.systems.impact_laws import EnergyRestitution, ImpactLaw, InelasticImpact, NewtonImpact, VelocityReduction
 from saltus.systems.impact_pair import ImpactPair
 from saltus.systems.metainterface import Metainterface
-from saltus.systems.model import Model, check_sides
-from saltus.systems.newton_impact import NewtonImpact
+from saltus.systems.model import Model
+from saltus.systems.one_contact_model import OneContactModel, check_one_contact
 from saltus.systems.pulse import Pulse
 from saltus.systems.pulses import Chirp, HalfSine, MavroeidisPapageorgiou, OneCosine, OneSine, Ramp, Ricker
 from saltus.systems.rocking_block import RockingBlock
@@ -60,7 +60,8 @@ def register(cls: T) -> T:
     if not isinstance(cls, type):
         raise ParameterError(f"register takes a Model or an ImpactLaw, got {shown(cls)}", "cls")
     if issubclass(cls, Model):
-        check_sides(cls)
+        if issubclass(cls, OneContactModel):
+            check_one_contact(cls)
         MODELS[cls.__name__] = cls
     elif issubclass(cls, ImpactLaw):
         IMPACTS[cls.__name__] = cls

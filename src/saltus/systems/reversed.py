@@ -18,7 +18,7 @@ from typing import Any
 
 from saltus.checks import settle_numbers
 from saltus.errors import ParameterError
-from saltus.systems.impact import ImpactLaw, VelocityReduction
+from saltus.systems.impact_laws import ImpactLaw, VelocityReduction
 from saltus.systems.load import Load
 from saltus.systems.model import Model
 from saltus.systems.signals import Constant, Harmonic, Record, Signal, Sum
@@ -156,10 +156,9 @@ def _check_resets(system: System, backward: System) -> None:
     """Refuse a model whose reset is not undone by the reversed law."""
     for side in system.model.sides:
         for speed in RESET_SPEEDS:
-            out = float(system.model.gap(system.model.contact + 1.0, side) - system.model.gap(system.model.contact, side))
-            before = -math.copysign(speed, out)
-            following, after = system.model.reset(0.0, before, side, system.load, system.impact)
-            back, again = backward.model.reset(0.0, -after, following, backward.load, backward.impact)
+            before = -speed * system.one_contact.inward(side)
+            following, after = system.one_contact.reset(0.0, before, side, system.load, system.impact)
+            back, again = backward.one_contact.reset(0.0, -after, following, backward.load, backward.impact)
             if back != side or not math.isclose(float(again), -before, rel_tol=1e-12):
                 raise ParameterError(
                     f"the reset of {type(system.model).__name__} cannot be followed backward: v+ = {float(after):g} on side "

@@ -10,11 +10,12 @@ import numpy as np
 
 from saltus.checks import RADIANS, settle_numbers
 from saltus.systems.load import Load, reversed_load
-from saltus.systems.model import MarginKind, Model
+from saltus.systems.model import MarginKind
+from saltus.systems.one_contact_model import OneContactModel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RockingBlock(Model):
+class RockingBlock(OneContactModel):
     """A rigid block rocking about its base corners, without bouncing (paper, `EOM&Rock`).
 
     With time scaled by p = sqrt(3 g / (4 R)), zeta = 3 U_h / (4 R) and nu = 3 U_v / (4 R), on the side s = +1 or -1:

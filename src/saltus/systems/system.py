@@ -10,12 +10,13 @@ from typing import Any
 from saltus.errors import ParameterError, near, shown
 from saltus.files import parsed_json
 from saltus.notebook import html_table
-from saltus.systems.contact import check_contacts
-from saltus.systems.friction import check_frictions
-from saltus.systems.impact import ImpactLaw, VelocityReduction
+from saltus.systems.contact_model import ContactModel
+from saltus.systems.impact_laws import ImpactLaw, VelocityReduction
 from saltus.systems.load import Load
 from saltus.systems.mirror import check_mirror, contact_images
-from saltus.systems.model import Model, check_sides
+from saltus.systems.model import Model
+from saltus.systems.model_checks import check_contact, check_works
+from saltus.systems.one_contact_model import OneContactModel
 from saltus.systems.parameters import children, numbers, replace
 from saltus.systems.serial import from_dict, to_dict
 
@@ -54,15 +55,7 @@ class System:
     impact: ImpactLaw = field(default_factory=VelocityReduction)
 
     def __post_init__(self) -> None:
-        kinds = {
-            "model": (Model, "a Model, such as Metainterface(beta0=1.4)"),
-            "load": (Load, "a Load, such as Load(frequency=1.0)"),
-        }
-        kinds["impact"] = (ImpactLaw, "an ImpactLaw, such as VelocityReduction(0.9)")
-        for name, (kind, words) in kinds.items():
-            if not isinstance(getattr(self, name), kind):
-                raise ParameterError(f"{name} must be {words}, got {shown(getattr(self, name))}", name)
-        check_sides(self.model)
+        _check_parts(self)
         for channel in self.load.channels:
             if channel not in self.model.channels:
                 known = [*self.model.channels, "frequency"]
@@ -70,21 +63,8 @@ class System:
                     f"{type(self.model).__name__} does not read load.{channel}; {near(channel, known)}", f"load.{channel}"
                 )
         self.model.check_load(self.load)
-        if self.model.frictions:
-            check_frictions(self.model)
-        if self.model.contacts:
-            check_contacts(self.model)
-            self.impact.restitution_matrix(self.model)
-        elif self.model.sides and type(self.impact).velocity_after is ImpactLaw.velocity_after:
-            raise ParameterError(
-                f"{type(self.impact).__name__} has no velocity_after, which a {type(self.model).__name__} with its one contact "
-                "needs; give VelocityReduction(e=...)",
-                "impact",
-            )
-        elif not self.model.sides and self.impact != VelocityReduction():
-            raise ParameterError(
-                f"this {type(self.model).__name__} has no impacts, so {self.impact!r} cannot act; leave it out", "impact"
-            )
+        check_works(self.model)
+        _check_impact(self.model, self.impact)
 
     def _repr_html_(self) -> str:
         parts = {name: type(getattr(self, name)).__name__ for name in ("model", "impact")}
@@ -151,9 +131,35 @@ class System:
         if load is None or contact_images(self.model, self.impact) is None:
             return None
         mirrored = System(model=self.model, load=load, impact=self.impact)
-        for side in self.model.sides or (1,):
+        for side in self.model.every_side:
             check_mirror(self, mirrored, side)
         return mirrored
+
+    @property
+    def one_contact(self) -> OneContactModel:
+        """Its model, for what only a model with one contact has.
+
+        Raises
+        ------
+        ParameterError
+            The model is of another class.
+        """
+        if not isinstance(self.model, OneContactModel):
+            raise ParameterError(f"{type(self.model).__name__} is no OneContactModel", "system")
+        return self.model
+
+    @property
+    def contact_model(self) -> ContactModel:
+        """Its model, for what only a model with contacts and frictions of single coordinates has.
+
+        Raises
+        ------
+        ParameterError
+            The model is of another class.
+        """
+        if not isinstance(self.model, ContactModel):
+            raise ParameterError(f"{type(self.model).__name__} is no ContactModel", "system")
+        return self.model
 
     def to_dict(self) -> dict[str, Any]:
         """Plain nested dictionaries, as written to JSON and TOML."""
@@ -224,6 +230,29 @@ class System:
         return cls.from_dict(_parsed(text, tomllib.loads, "TOML"))
 
 
+def _check_parts(system: System) -> None:
+    """Refuse parts of a system that are of no class for their place."""
+    if not isinstance(system.model, Model):
+        raise ParameterError(f"model must be a Model, such as Metainterface(beta0=1.4), got {shown(system.model)}", "model")
+    if not isinstance(system.load, Load):
+        raise ParameterError(f"load must be a Load, such as Load(frequency=1.0, ...), got {shown(system.load)}", "load")
+    if not isinstance(system.impact, ImpactLaw):
+        raise ParameterError(
+            f"impact must be an ImpactLaw, such as VelocityReduction(e=0.9), got {shown(system.impact)}", "impact"
+        )
+
+
+def _check_impact(model: Model, impact: ImpactLaw) -> None:
+    """Refuse an impact law that means nothing for the contacts of a model."""
+    if isinstance(model, ContactModel) and model.contacts:
+        impact.restitution_matrix(model)
+    elif isinstance(model, OneContactModel) and model.sides:
+        impact.check_one_contact(model)
+        check_contact(model, impact)
+    elif impact != VelocityReduction():
+        raise ParameterError(f"this {type(model).__name__} has no impacts, so {impact!r} cannot act; leave it out", "impact")
+
+
 def _parsed(text: str, parse: Callable[[str], Any], language: str) -> Any:
     try:
         return parse(text)
@@ -247,9 +276,8 @@ def check_system(system: Any, asking: str, *, coordinates: int | None = None, se
     if coordinates is not None and len(names) != coordinates:
         wanted = "one coordinate" if coordinates == 1 else f"{coordinates} coordinates"
         raise ParameterError(f"{asking} is for models with {wanted}, and this one has {', '.join(names)}", "system")
-    if system.model.held and not several_contacts:
-        names = (*(contact.name for contact in system.model.contacts), *(friction.name for friction in system.model.frictions))
-        parts = ", ".join(names)
+    if system.model.holds_coordinates and not several_contacts:
+        parts = ", ".join([part.name for part in system.model.contacts] + [part.name for part in system.model.frictions])
         raise ParameterError(
             f"{asking} is for models with one contact so far, and {type(system.model).__name__} has {parts}; use simulate",
             "system",

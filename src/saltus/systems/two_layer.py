@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.systems.constrained import reactions
 from saltus.systems.contact import Contact
+from saltus.systems.contact_model import ContactModel, reactions
 from saltus.systems.layered_cell import LayeredCell
 from saltus.systems.load import Load, reversed_load
 from saltus.systems.model import MarginKind
@@ -19,7 +19,7 @@ CONTACTS = (Contact(name="lower", coordinate="theta_1"), Contact(name="upper", c
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TwoLayer(LayeredCell):
+class TwoLayer(LayeredCell, ContactModel):
     """The metainterface with theta_1 >= 0 of the lower and theta_2 <= 0 of the upper layer (paper, `eomnl`).
 
         M(theta) theta'' + C theta' + D(theta) theta'^2 + K theta = f(theta, tau),   S = 2 beta0 + theta_1 - theta_2,

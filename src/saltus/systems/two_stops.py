@@ -8,12 +8,12 @@ from typing import Any, ClassVar
 from saltus.checks import settle_numbers
 from saltus.errors import ParameterError
 from saltus.systems.contact import Contact
+from saltus.systems.contact_model import ContactModel
 from saltus.systems.load import Load, reversed_load
-from saltus.systems.model import Model
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TwoStops(Model):
+class TwoStops(ContactModel):
     """x'' + c x' + k x = F(tau) for d_1 <= x <= d_2: contacts `left` and `right`, with an impact law such as `NewtonImpact`.
 
     Parameters

@@ -7,11 +7,11 @@ from typing import Any, ClassVar
 
 from saltus.checks import settle_numbers
 from saltus.systems.load import Load
-from saltus.systems.model import Model
+from saltus.systems.one_contact_model import OneContactModel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WallOscillator(Model):
+class WallOscillator(OneContactModel):
     """x'' + c x' + k x = F(tau), free while x < d; at the wall x = d the velocity turns round, v+ = -e v-.
 
     It has one mode, which an impact at the wall ends and begins anew. It can rest at the wall while F - k d > 0.

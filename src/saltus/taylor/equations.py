@@ -67,9 +67,7 @@ def _traced_parts(system: System) -> dict[str, str]:
 
 def _margins(system: System) -> str:
     """The margins as text; if they cannot be traced, and so cannot end a motion, their names take the place of expressions."""
-    state = (0.1,) * len(system.model.coordinates)
-    at: Any = state[0] if len(state) == 1 else state
-    names = tuple(system.model.margins(0.0, at, at, at, (*system.model.sides, 1)[0], system.load))
+    names = system.model.margin_names(system.load)
     try:
         traced = trace(system, names)
     except SaltusError:

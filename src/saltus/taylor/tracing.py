@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from saltus.checks import LIMITS
 from saltus.errors import ParameterError, SaltusError, TraceError, near
 from saltus.systems import (
+    DeclaredLoad,
     Pulse,
     Record,
     System,
@@ -76,19 +77,6 @@ class LoadTime:
     __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = __pow__ = __rpow__ = __neg__ = __pos__ = __abs__ = refuse
     __float__ = __int__ = __bool__ = __lt__ = __gt__ = __le__ = __ge__ = __eq__ = __ne__ = __array__ = refuse
     __hash__ = object.__hash__
-
-
-class DeclaredLoad:
-    """The load in a traced model: it has only the channels that the model declares, so that a misspelt name is not read as 0."""
-
-    def __init__(self, load: Any, model: Any) -> None:
-        self._load, self._model = load, model
-
-    def __getattr__(self, name: str) -> Any:
-        channels = self._model.channels
-        if name not in (*channels, "frequency", "period"):
-            raise TraceError(f"{type(self._model).__name__} reads load.{name}, not one of its channels; {near(name, channels)}")
-        return getattr(self._load, name)
 
 
 @dataclass(eq=False)
@@ -173,7 +161,7 @@ def trace(system: System, stop_at: tuple[str, ...] = (), sensitivities: tuple[st
     velocities = tuple(Expr("velocity", (), i) for i in range(dof))
     side = Expr("side") if model.sides else number(1.0)
     q, v = (coordinates[0], velocities[0]) if dof == 1 else (coordinates, velocities)
-    several = model.held
+    several = model.holds_coordinates
     accelerations = _trace_contacts(result, twin, t, q, v) if several else ask(model, "acceleration", t, q, v, side, load)
     if dof > 1 and len(accelerations if isinstance(accelerations, (tuple, list)) else [accelerations]) != dof:
         raise TraceError(f"{type(system.model).__name__}.acceleration must return {dof} values, got {accelerations!r}")

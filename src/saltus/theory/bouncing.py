@@ -257,7 +257,7 @@ def _fall_speed(layer: Layer, peak: float) -> float:
 
 def _after_impact(system: System, speed: float, side: int) -> float:
     """The speed after an impact that ends `side`, of a motion that comes to the contact with the velocity -side speed."""
-    return abs(float(system.impact.velocity_after(system.model, 0.0, -side * speed, side, -side, system.load)))
+    return abs(float(system.impact.velocity_after(system.one_contact, 0.0, -side * speed, side, -side, system.load)))
 
 
 def _check_ratios(stiffness_ratio: Any, mass_ratio: Any) -> None:

@@ -158,7 +158,7 @@ def linear_motion(system: System, theta0: float, impacts: int) -> LinearMotion:
     while (t := arcs[-1].impact_time()) is not None and len(before) < impacts:
         times.append(times[-1] + t)
         before.append(side * float(arcs[-1].speed(t)))
-        after.append(float(system.impact.velocity_after(system.model, times[-1], before[-1], side, -side, system.load)))
+        after.append(float(system.impact.velocity_after(system.one_contact, times[-1], before[-1], side, -side, system.load)))
         side = -side
         if after[-1] == 0:
             t = None

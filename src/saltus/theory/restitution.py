@@ -149,7 +149,7 @@ def velocity_factor(system: System, velocity: float, side: int, r: float, tau: f
     """
     if velocity == 0:
         raise ParameterError("e = theta'+ / theta'- has no meaning at velocity 0", "velocity")
-    after = float(EnergyRestitution(r).velocity_after(system.model, tau, velocity, side, -side, system.load))
+    after = float(EnergyRestitution(r).velocity_after(system.one_contact, tau, velocity, side, -side, system.load))
     if math.isnan(after):
         raise ParameterError(
             f"no velocity of the same sign keeps r = {r!r} of the energy at tau = {tau!r} from theta' = {velocity!r}", "r"

@@ -93,7 +93,7 @@ class Labelling:
     def _rests(self, target: Target, ends: Recurrence) -> np.ndarray:
         """Which motions are at rest for good in the state of an attractor, (n,); a model with one contact has one such state."""
         here = target.distance(ends.last) < SAME_STATE * max(1.0, float(np.abs(target.states).max()))
-        return np.asarray(here & (ends.rest | (ends.period == 1)) if self.system.model.held else ends.rest)
+        return np.asarray(here & (ends.rest | (ends.period == 1)) if self.system.model.holds_coordinates else ends.rest)
 
     def _times(self, label: np.ndarray, ends: Recurrence) -> np.ndarray:
         """The forcing periods after which each motion stays near its attractor for as long as it is followed; nan if undecided.

@@ -295,13 +295,8 @@ def _grid(system: System, velocity: Any, coordinates: Mapping[str, Any], found: 
 def _over(system: System, window: Window, place: int) -> np.ndarray:
     """Evenly spaced values of a state variable over a window, without those beyond a contact."""
     values = window.centre[place] + window.half[place] * np.linspace(-1.0, 1.0, SETTINGS.cells)
-    model = system.model
-    if model.sides and place == 0:
-        return np.asarray(values[np.max([np.asarray(model.gap(values, s)) for s in model.sides], axis=0) >= 0.0])
-    for contact in model.contacts:
-        if place < len(model.coordinates) and contact.coordinate == model.coordinates[place]:
-            values = values[np.asarray(contact.gap(values)) >= 0.0]
-    return np.asarray(values)
+    names = system.model.coordinates
+    return np.asarray(values[system.model.reaches(names[place], values)] if place < len(names) else values)
 
 
 def _dataset(found: Attractors, grid: Grid, label: np.ndarray, time: np.ndarray, numbers: dict[str, Any]) -> xarray.Dataset:

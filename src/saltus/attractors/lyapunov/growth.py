@@ -201,7 +201,7 @@ class LargestExponents:
     def __init__(
         self, system: System, states: np.ndarray, parameters: Mapping[str, np.ndarray], *, shortest: int, tol: float = 1e-10
     ) -> None:
-        kind = Neighbours if system.model.contacts else Stretching
+        kind = Neighbours if system.model.names_its_contacts else Stretching
         self._perturbations = kind(system, states, parameters, turning=shortest // 4, tol=tol)
         self.found = Largest.unknown(len(states))
 

@@ -269,7 +269,7 @@ def _measures(system: System, run: _Many, stretched: Stretched, captured: np.nda
         growth = np.where((captured & lossy)[None, :, None], -np.inf, growth)
     found, duration = Estimate.of(growth / run.lengths[None, :, None]), len(growth) * run.lengths
     # Contacts and frictions that hold a coordinate for a while make an exponent -inf also where the motion goes on.
-    rested = captured | (still if system.model.held else np.isneginf(found.value[:, 1]))
+    rested = captured | (still if system.model.holds_coordinates else np.isneginf(found.value[:, 1]))
     moving = np.isfinite(stretched.states).all(axis=1)
     return {
         "exponent": found.value,

@@ -47,7 +47,7 @@ class Contraction:
     def __init__(self, system: System) -> None:
         traced = trace(system)
         self._leaves = Leaves([Interval(value) for value in system.parameters.values()], [])
-        sides = system.model.sides or (1,)
+        sides = system.model.every_side
         damping = {s: substitute(differentiate(traced.acceleration[0], VELOCITY), {Expr("side"): float(s)}) for s in sides}
         after = traced.velocity_after
         self._slopes = {}
@@ -55,8 +55,7 @@ class Contraction:
             self._slopes = {s: differentiate(substitute(after, {Expr("side"): float(s)}), VELOCITY) for s in sides}
         known = not any(reads(d, "time", "coordinate", "velocity", "record") for d in damping.values())
         known &= not any(reads(slope, "record") for slope in self._slopes.values())
-        single = len(system.model.coordinates) == 1 and not system.model.held
-        self.known = known and single  # whether da/dv is constant on each side
+        self.known = known and system.model.has_state_plane  # whether da/dv is constant on each side
         linear = {s: d for s, d in self._slopes.items() if not reads(d, "time", "velocity", "record")}
         self._factors = {s: _middle(enclose([d], self._leaves)[0]) for s, d in linear.items()}
         self._rates = {s: _middle(enclose([d], self._leaves)[0]) for s, d in damping.items()} if self.known else {}
@@ -95,10 +94,10 @@ def impact_factor(system: System, parameters: Mapping[str, np.ndarray]) -> np.nd
     """
     traced = trace(system)
     if traced.velocity_after is None:
-        return np.zeros(()) if system.model.held else np.ones(())
+        return np.zeros(()) if system.model.holds_coordinates else np.ones(())
     values = [Interval(np.asarray(parameters.get(path, value), dtype=float)) for path, value in system.parameters.items()]
     product = np.ones(())
-    for side in system.model.sides:
+    for side in system.model.every_side:
         slope = differentiate(substitute(traced.velocity_after, {Expr("side"): float(side)}), VELOCITY)
         product = product * np.abs(_middle(enclose([slope], Leaves(values, []))[0]))
     return product
@@ -359,7 +358,7 @@ class _Run:
         frame, upper = np.linalg.qr(found.state @ frame)
         with np.errstate(divide="ignore"):
             lengths = np.abs(np.diag(upper))
-            if self.system.model.held:  # lengths in directions held by contacts and frictions are 0, up to rounding
+            if self.system.model.holds_coordinates:  # lengths in directions held by contacts and frictions are 0, up to rounding
                 lengths[lengths < LYAPUNOV.rounding * lengths.max()] = 0.0
             self.stretch[p] += np.log(lengths)
         self.areas[p] += contraction.along(found.motion)

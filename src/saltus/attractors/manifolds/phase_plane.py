@@ -21,7 +21,7 @@ from saltus.checks import check_number
 from saltus.errors import ParameterError
 from saltus.flow import Motion, simulate
 from saltus.result import Result, result_dataset
-from saltus.systems import Constant, System, VelocityReduction, check_system, reversed_system
+from saltus.systems import Constant, System, check_system, reversed_system
 from saltus.window import Box, Window, check_window
 
 if TYPE_CHECKING:
@@ -103,15 +103,15 @@ def equilibria(system: System, window: Box = PLANE) -> tuple[Equilibrium, ...]:
     area = check_window(window, system)
     model, low, high = system.model, *area[0]
     found = []
-    for side in model.sides or (1,):
+    for side in model.every_side:
         grid = np.linspace(low, high, EQUILIBRIA.grid)
-        if model.sides:
-            grid = np.sort(np.append(grid[np.asarray(model.gap(grid, side)) > 0.0], _beside(system, side)))
+        if model.has_one_contact:
+            grid = np.sort(np.append(grid[np.asarray(system.one_contact.gap(grid, side)) > 0.0], _beside(system, side)))
         pull = _pull(system, side)
         for place in _zeros(pull, grid[(grid >= low) & (grid <= high)]):
             values = _eigenvalues(system, place, side)
             found.append(Equilibrium(place, side, values, values[0].real <= EQUILIBRIA.neutral))
-    if model.sides and low <= float(model.contact) <= high:
+    if model.has_one_contact and low <= float(model.contact) <= high:
         found += _at_contact(system)
     return tuple(sorted(found, key=lambda one: one.place))
 
@@ -135,10 +135,7 @@ def _pull(system: System, side: int) -> Callable[[float], float]:
 
 def _beside(system: System, side: int) -> float:
     """A coordinate just inside a side."""
-    contact = float(system.model.contact)
-    return contact + (
-        EQUILIBRIA.inside if float(system.model.gap(contact + EQUILIBRIA.inside, side)) > 0.0 else -EQUILIBRIA.inside
-    )
+    return float(system.model.contact) + EQUILIBRIA.inside * system.one_contact.inward(side)
 
 
 def _zeros(pull: Callable[[float], float], grid: np.ndarray) -> Iterator[float]:
@@ -165,7 +162,7 @@ def _eigenvalues(system: System, place: float, side: int) -> tuple[complex, comp
 def _at_contact(system: System) -> list[Equilibrium]:
     """The contact as an equilibrium: a stable one if all sides push towards it, an unstable one if both push away from it."""
     contact, outward = float(system.model.contact), []
-    for side in system.model.sides:
+    for side in system.model.every_side:
         place = _beside(system, side)
         pull = _pull(system, side)
         outward.append((pull(contact) or pull(place)) * (place - contact) > 0.0)
@@ -328,7 +325,7 @@ def _sampled(motion: Motion, begin: float, step: float) -> np.ndarray:
     theta, velocity = motion.at(times)
     impacts, contact = motion.impacts, float(motion.system.model.contact)
     rows = [np.stack([times, theta, velocity])]
-    jump = not (isinstance(motion.system.impact, VelocityReduction) and len(motion.system.model.sides) == 2)
+    jump = bool((impacts.velocity_before != impacts.velocity_after).any())
     for values in (impacts.velocity_before, np.full(len(impacts), np.nan), impacts.velocity_after)[:: 1 if jump else 2]:
         at = np.full(len(impacts), contact)
         rows.append(np.stack([impacts.time, np.where(np.isnan(values), np.nan, at), values]))

@@ -10,12 +10,9 @@ from typing import Any
 import numpy as np
 
 from saltus.checks import check_names
-from saltus.errors import ParameterError
 from saltus.flow.kernel.compiled import Structure, load_structure
 from saltus.systems import System, numbers
 from saltus.taylor import Trace, record_table, structure_key, trace
-
-OFF_CONTACT = 1e-9  # the largest gap at the contact, relative to its rate, that may be rounding; an error of a model is larger
 
 
 @dataclass(frozen=True)
@@ -59,22 +56,3 @@ def limits_of(system: System, stop_at: Iterable[str]) -> tuple[str, ...]:
 def taylor_order(tol: float) -> int:
     """The order of series that is fastest at a tolerance: 10 at 1e-6, 15 at 1e-10, 20 at 1e-14."""
     return round(10 + 1.25 * (-math.log10(tol) - 6))
-
-
-def check_contact(system: System) -> None:
-    """Refuse a gap that is not 0 at `contact`, and a reset that sends the motion beyond the contact."""
-    model, load, impact = system.model, system.load, system.impact
-    point, name = float(model.contact), type(model).__name__
-    rates = {side: float(model.gap(point + 1.0, side)) - float(model.gap(point, side)) for side in model.sides}
-    for side, rate in rates.items():
-        at = float(model.gap(point, side))
-        if abs(at) > OFF_CONTACT * abs(rate):
-            raise ParameterError(f"{name}.gap must be 0 at {name}.contact = {point:g}, got {at:g} on side {side}; give both")
-        before = -math.copysign(1.0, rate)
-        following, after = model.reset(0.0, before, side, load, impact)
-        if rates.get(int(following), 0.0) * after < 0.0:
-            raise ParameterError(
-                f"{name}.reset sends the motion beyond the contact: on side {side} the velocity {before:g} becomes "
-                f"{float(after):g} on side {int(following)}; velocities are rates of the coordinate, and "
-                + ("a bounce turns the sign of what impact.velocity_after returns" if following == side else "a passage keeps it")
-            )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.checks import check_memory, check_number, check_work
-from saltus.flow.kernel.structures import Program, check_contact, limits_of, program
+from saltus.flow.kernel.structures import Program, limits_of, program
 from saltus.flow.lanes.capture_speeds import capture_speeds
 from saltus.flow.lanes.compiled_lanes import compile_beside, compile_driver_aside, load_lane_functions
 from saltus.flow.lanes.ensemble_dataset import to_dataset
@@ -123,10 +123,8 @@ def run_ensemble(
     captured: np.ndarray | None = None,
 ) -> EnsembleResult:
     """Compile the code that is not there yet, and run the trajectories; `captured` holds speeds of capture that are known."""
-    driver = compile_driver_aside(system.model.held)
+    driver = compile_driver_aside(system.model.holds_coordinates)
     run = program(system, wanted.limits, wanted.paths)
-    if system.model.sides:
-        check_contact(system)
     jobs = _jobs(system, run, inputs, wanted.periods, duration, side)
     if Until.REST in wanted.until:
         jobs.numbers[:, JobNumber.CAPTURE_SPEED] = capture_speeds(system, inputs.parameters, wanted.limits, known=captured)
@@ -137,7 +135,7 @@ def run_ensemble(
     check_memory("last", 16.0 * len(wanted.sample) * kept * inputs.size, f"samples of {kept} periods of {inputs.size} motions")
     lanes = compiled_lanes(system, run, wanted, kept)
     if driver is not None:
-        compile_beside(driver, system.model.held)
+        compile_beside(driver, system.model.holds_coordinates)
     ends = lanes.run(jobs, threads, progress, total=float(np.sum(spans + 1)))
     return EnsembleResult(system, inputs, wanted, jobs, ends)
 

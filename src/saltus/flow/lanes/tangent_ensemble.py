@@ -34,7 +34,7 @@ class TangentEnsemble:
         run = program(system, limits, ())
         self._lanes = compiled_lanes(system, run, wanted, 1)
         self._columns = {places.index(path): values for path, values in parameters.items()}
-        self._lengths, self.held = lengths, system.model.held
+        self._lengths, self.held = lengths, system.model.holds_coordinates
         self._records = record_tables(system, run.trace.records, {})
         compile_everything(self.held)  # here, not in each thread that advances some of the motions
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from saltus.public_functions import answered
-from saltus.systems import Load, Model, System, check_system
+from saltus.systems import ContactModel, Load, System, check_system
 
 RELEASE_SAMPLES = 64  # per forcing period and order of the highest harmonic: the contact acceleration has no narrower peak
 
@@ -51,13 +51,13 @@ def contact_pull(system: System, side: int) -> Callable[[Any], Any]:
         held, names = model.contacts[side - 1], model.coordinates
         place = {contact.coordinate: float(contact.position) for contact in model.contacts}
         position, i = [place.get(name, 0.0) for name in names], names.index(held.coordinate)
-        return lambda t: held.sign * np.asarray(_force_at_rest(model, t, position, load)[i], dtype=float)
-    contact = float(model.contact)
-    rate = float(model.gap(contact + 1.0, side)) - float(model.gap(contact, side))
+        return lambda t: held.sign * np.asarray(_force_at_rest(system.contact_model, t, position, load)[i], dtype=float)
+    contact, one = float(model.contact), system.one_contact
+    rate = float(one.gap(contact + 1.0, side)) - float(one.gap(contact, side))
     return lambda t: rate * np.asarray(model.acceleration(t, contact, 0.0, float(side), load), dtype=float)
 
 
-def _force_at_rest(model: Model, t: Any, position: list[float], load: Load) -> list[Any]:
+def _force_at_rest(model: ContactModel, t: Any, position: list[float], load: Load) -> list[Any]:
     """r(t, q, 0), as a list."""
     if len(position) == 1:
         return [model.force(t, position[0], 0.0, load)]

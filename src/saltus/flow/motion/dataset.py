@@ -35,7 +35,7 @@ def to_dataset(motion: Motion, times: Any = None) -> xarray.Dataset:
         unit = motion.system.model.unit_of(name)
         dataset[name] = ("time", position[i], {"units": unit})
         dataset[rate_name(name, names)] = ("time", velocity[i], {"units": unit, "long_name": f"d {name} / d tau"})
-    if motion.system.model.held:
+    if motion.system.model.holds_coordinates:
         _add_contacts(motion, dataset, side)
     else:
         dataset["side"] = ("time", side.astype(np.int8), {"units": "1", "long_name": "side, 0 at rest"})

@@ -44,7 +44,7 @@ class Recorder:
         model = request.system.model
         self._contacts = [contact.name for contact in model.contacts]
         self._frictions = [friction.name for friction in model.frictions]
-        self._several = model.held
+        self._several = model.holds_coordinates
         self._width = 1 + 2 * dof + len(self._contacts) if self._several else 3  # the numbers of an event before its shifts
         self.events = (np.empty((MOST.buffer, 4), dtype=np.int64), np.empty((MOST.buffer, self._width + columns)))
         self.total = 0  # events so far

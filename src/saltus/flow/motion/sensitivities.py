@@ -222,7 +222,7 @@ def state_rates(motion: Motion) -> np.ndarray:
     if side == 0:
         return np.zeros(2 * velocity.size)
     acceleration: Any
-    if system.model.held:
+    if system.model.holds_coordinates:
         held = {contact.coordinate for contact in system.model.contacts if contact.name in motion.closed}
         slides = list(motion.sliding.values())
         held |= {friction.coordinate for friction, s in zip(system.model.frictions, slides, strict=True) if s == 0}

@@ -107,7 +107,7 @@ class Followed:
 def follow(request: MotionRequest, progress: Progress, run: Program | None = None) -> Followed:
     """Follow the motion of a request, with its tangent if the request asks for one; `run` is its program, if that is known."""
     run = run or program(request.system, request.limits, request.sensitivities)
-    now = (ContactState if request.system.model.held else KernelState).at_start(request, run)
+    now = (ContactState if request.system.model.holds_coordinates else KernelState).at_start(request, run)
     recorder = Recorder(request, int(now.where[Where.ORDER]), int(now.where[Where.COLUMNS]))
     status = _advance(request.system, run, now, recorder, progress)
     return Followed(_collect(request, now, status, recorder), now.columns, recorder.event_shifts())
@@ -116,7 +116,7 @@ def follow(request: MotionRequest, progress: Progress, run: Program | None = Non
 def _advance(system: System, run: Program, now: KernelState, recorder: Recorder, progress: Progress) -> int:
     """Call the kernel until the motion ends, emptying its buffers in between; returns why it ended."""
     begin, end = now.time, now.end_time
-    many = MOST.burst if system.model.held else MOST.rate
+    many = MOST.burst if system.model.holds_coordinates else MOST.rate
     checked_at, counted, unit = begin, 0, min(now.settings[Setting.LENGTH] or 1.0, 1.0) * many / MOST.rate
     progress(0.0, WHAT)
     while True:
@@ -164,7 +164,7 @@ def _why_so_many(system: System, recorder: Recorder) -> str:
 def _refuse(system: System, status: int, now: KernelState) -> None:
     """Raise an error, with a sentence, for a status that is no regular end of a motion."""
     at, velocity = f"at time {now.time:.9g}", now.velocity[0]
-    if status in (Status.NOT_UNIQUE, Status.NO_IMPACT) and system.model.held:
+    if status in (Status.NOT_UNIQUE, Status.NO_IMPACT) and system.model.holds_coordinates:
         choice = "no choice of closed contacts, and of what sticks, is consistent"
         what = choice if status == Status.NOT_UNIQUE else "the impact law has no solution"
         raise MotionError(f"{what} {at}: the mass matrix is not positive definite there, or all but singular")

@@ -97,7 +97,7 @@ class ValidityCheck:
             self._system.model,
             {name: beyond / duration if duration else 0.0 for name, beyond in self._beyond.items()},
         )
-        gains = energy_gain(model, self._system.impact) if model.contacts else {}
+        gains = energy_gain(self._system.contact_model, self._system.impact) if model.contacts else {}
         return Validity(dict(self._first), shares, {name: gain for name, gain in gains.items() if gain > GAIN_ROUNDING})
 
 

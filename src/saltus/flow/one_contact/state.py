@@ -11,7 +11,7 @@ from saltus.errors import ParameterError
 from saltus.flow.kernel.compiled import load_kernel
 from saltus.flow.kernel.layout import STRUCTURE_SIZES, Mode, ModelPart, Setting, Where
 from saltus.flow.kernel.memory_layout import State
-from saltus.flow.kernel.structures import Program, check_contact, taylor_order
+from saltus.flow.kernel.structures import Program, taylor_order
 from saltus.flow.motion.request import MotionRequest
 from saltus.flow.one_contact.sides import side_of_state
 
@@ -85,10 +85,8 @@ class KernelState:
 
 def _mode_and_side(request: MotionRequest, run: Program) -> tuple[int, int]:
     model = request.system.model
-    if model.sides:
-        check_contact(request.system)
     position, speed = float(request.position[0]), float(request.speeds[0])
-    if model.held:
+    if model.holds_coordinates:
         return Mode.CONTACT, 0
     mode, side = side_of_state(len(model.sides), position, speed, run.model[ModelPart.GEOMETRY])
     if mode == Mode.BEYOND:

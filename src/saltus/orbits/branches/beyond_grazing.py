@@ -86,7 +86,7 @@ def _admissible_direction(start: OrbitPoint) -> OrbitPoint | None:
 
 def _turns_round(equations: OneContactEquations, side: int) -> bool:
     """Whether an impact stays on its side, as at a wall."""
-    model, load, impact = equations.system.model, equations.system.load, equations.system.impact
+    model, load, impact = equations.system.one_contact, equations.system.load, equations.system.impact
     return bool(model.reset(0.0, 1.0, side, load, impact)[0] == side)
 
 

@@ -223,7 +223,7 @@ class BranchEvents(OrbitEvents):
                 return end
             if (cut := stalled_at(point, step, run.points)) is not None:
                 return cut
-        if point.orbit.equations.system.model.held and (limit := point.orbit.motion().limit) is not None:
+        if point.orbit.equations.system.model.holds_coordinates and (limit := point.orbit.motion().limit) is not None:
             return End(OrbitEnd.REFUSED, point.parameter, detail=limit)
         largest = abs(point.orbit.multipliers[0])
         if largest > SETTINGS.steepest and not point.orbit.grazes:

@@ -39,7 +39,7 @@ class OrbitPoint(Point):
     def half_way(self) -> np.ndarray | None:
         """The difference of the image of an orbit without impacts from the orbit; None where it cannot be its own image."""
         equations, odd = self.curve.equations, self.orbit.signature.period % 2
-        sides = equations.system.model.sides and not equations.passes_contact
+        sides = equations.system.model.has_one_contact and not equations.passes_contact
         if equations.signature.sides or equations.signature.closed or (odd and (sides or not self.curve.symmetric)):
             return None
         n = equations.size

@@ -142,7 +142,7 @@ def continue_special(
     check_count("most_points", most_points, 1)
     if special.kind not in FOLLOWED:
         raise ParameterError(f"curves are followed of {', '.join(FOLLOWED)}, not of {special.kind}", "special")
-    if special.kind == SpecialKind.GR and special.orbit.system.model.held:
+    if special.kind == SpecialKind.GR and special.orbit.system.model.holds_coordinates:
         raise ParameterError(
             "of models with several contacts or friction curves are followed of LP, PD and BPC, not of GR so far; "
             "continue an orbit at several values of the second parameter instead",

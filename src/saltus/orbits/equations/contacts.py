@@ -271,5 +271,5 @@ def equations_of(
     system: System, signature: Signature, paths: tuple[str, ...] = (), tol: float = ORBIT_TOLERANCE
 ) -> OneContactEquations:
     """The problem of a signature: with one contact, with several, or, if the signature has a section, followed as one motion."""
-    kind: type[OneContactEquations] = ContactsEquations if system.model.held else OneContactEquations
+    kind: type[OneContactEquations] = ContactsEquations if system.model.holds_coordinates else OneContactEquations
     return (kind if signature.section is None else WholeMotionEquations)(system, signature, paths, tol)

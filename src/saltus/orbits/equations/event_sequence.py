@@ -121,7 +121,7 @@ def _groups(motion: Motion) -> tuple[Group, ...]:
     names = dict.fromkeys(contact.group for contact in model.contacts)
     if len(names) < 2 or model.frictions:
         return everything
-    mass, found = np.asarray(model.mass_matrix(motion.position), dtype=float), list[Group]()
+    mass, found = np.asarray(motion.system.contact_model.mass_matrix(motion.position), dtype=float), list[Group]()
     places = [
         [model.coordinates.index(contact.coordinate) for contact in model.contacts if contact.group == name] for name in names
     ]

@@ -148,7 +148,7 @@ class OneContactEquations:
     @cached_property
     def passes_contact(self) -> bool:
         """Whether the contact is no singularity for any values of the parameters at `paths`, so that orbits pass through it."""
-        if self.signature.sides or not self.system.model.sides:
+        if self.signature.sides or not self.system.model.has_one_contact:
             return False
         values = self._values.copy()
         values[self._places] = 0.0  # The answer holds for all of them, and is then computed once.
@@ -333,8 +333,4 @@ class OneContactEquations:
 
 def _ready(system: System, paths: tuple[str, ...]) -> Any:
     """The compiled program of a system with derivatives to the parameters at `paths`, and with all of the model's margins."""
-    model = system.model
-    side = (*model.sides, 1)[0]
-    still: Any = 0.0 if len(model.coordinates) == 1 else (0.0,) * len(model.coordinates)
-    margins = tuple(model.margins(0.0, still, still, still, side, system.load))
-    return program(system, margins, paths)
+    return program(system, system.model.margin_names(system.load), paths)

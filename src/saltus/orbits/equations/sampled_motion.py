@@ -92,7 +92,7 @@ class SampledMotion:
 
     def margins(self) -> dict[str, float]:
         """The least value of each of the model's margins."""
-        system, side = self.motion.system, (*self.motion.system.model.sides, 1)[0]
+        system, side = self.motion.system, self.motion.system.model.every_side[0]
         values = system.model.margins(self.time, *self._state(), side, system.load)
         return {name: _least(np.broadcast_to(value, self.time.shape)) for name, value in values.items()}
 

@@ -205,7 +205,7 @@ def orbit_from(base: OneContactEquations, state: dict[str, Any], periods: int) -
     """The orbit near a motion over `periods` forcing periods from a state at phase 0; it may be one that rests for a part of
     them."""
     orbit = orbit_near(base, state, periods)
-    if (orbit is not None and orbit.admissible) or base.system.model.held:
+    if (orbit is not None and orbit.admissible) or base.system.model.holds_coordinates:
         return orbit
     return resting_near(base, simulate(base.system, **state, periods=periods, dense=False), periods) or orbit
 

@@ -132,7 +132,7 @@ def _mapped(system: System, path: str, values: np.ndarray, states: np.ndarray, p
 
     A contact that is closed at the start stays closed: derivatives to its coordinate and velocity are 0.
     """
-    if system.model.held and system.dimension > SETTINGS.in_lanes:
+    if system.model.holds_coordinates and system.dimension > SETTINGS.in_lanes:
         return _mapped_singly(system, path, values, states, period)
     options: dict[str, Any] = {"periods": period, "sample": (), "tol": SETTINGS.tol, "sensitivities": ()}
     result = motions_from(system, states, parameters={path: values}, **options)

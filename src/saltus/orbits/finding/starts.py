@@ -44,7 +44,7 @@ def within_window(system: System, points: np.ndarray, window: Window, shrunk: An
     states = np.asarray((points * window.half + (window.centre - rest)) * shrunk + rest)
     model = system.model
     if len(model.sides) == 1:
-        inward = np.sign(float(model.gap(model.contact + 1.0, model.sides[0])))
+        inward = system.one_contact.inward(model.sides[0])
         states[..., 0] = rest[0] + inward * np.abs(states[..., 0] - rest[0])
     return _held(system, on_this_side(system, states), window) if model.contacts else states
 

@@ -76,7 +76,7 @@ def cells(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, n
 def computed(request: ChartRequest) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """The variables of a chart with a row for each of its cells, and its motions, of dtype `motion_type`."""
     settled, judged, motions = stable_motions(request)
-    columns = table(motions, len(settled.captured), request.variables, bool(request.system.model.contacts)) | {
+    columns = table(motions, len(settled.captured), request.variables, request.system.model.names_its_contacts) | {
         "rest": settled.captured > 0,
         "tiny": settled.tiny,
         **_verdicts(settled, judged),
@@ -194,11 +194,11 @@ def _followed(request: ChartRequest, motions: np.ndarray, periods: int) -> tuple
         kept=SETTINGS.kept,
         extrema=True,
         impact_count=True,
-        speed=bool(request.system.model.contacts),
+        speed=request.system.model.names_its_contacts,
         tol=request.tol,
     )
     going, state = ends, ends.last
-    if not request.system.model.held:  # with several contacts or frictions an extrapolated state may lie beyond a contact
+    if not request.system.model.holds_coordinates:  # else an extrapolated state may lie beyond a contact
         ahead, period = approached(ends.states, request.max_period)
         going = replace(ends, period=np.where(ends.unsettled, period, ends.period))  # its extrema are those of the last period
         state = np.where(ends.unsettled[:, None], ahead, ends.last)

@@ -142,11 +142,11 @@ class Ways:
             kept=2 * self.max_period,
             extrema=True,
             impact_count=True,
-            speed=bool(self.system.model.contacts),
+            speed=self.system.model.names_its_contacts,
             tol=self.tol,
         )
         ahead = ends.last
-        if not self.system.model.held:  # with several contacts or frictions an extrapolated state may lie beyond a contact
+        if not self.system.model.holds_coordinates:  # else an extrapolated state may lie beyond a contact
             ahead, _ = approached(ends.states, self.max_period)
         own = len(self.system.model.coordinates)
         size = np.nanmax(np.abs(ends.states[:, :, :own]), axis=(1, 2), initial=0.0)[:, None]

@@ -188,7 +188,7 @@ class ChartRequest:
             ("motion_impact_count", "i4", "1", each, "impacts in a period of each motion"),
             *((f"motion_{name}", "f8", unit, each, f"{name} of each motion at phase 0") for name in self.variables),
         ]
-        if model.contacts:
+        if model.names_its_contacts:
             rows.append(("motion_slowest", "f8", unit, each, "least speed of an impact of each motion, 0 without impacts"))
         limits = amplitude_limits(self.system)
         rows += [(f"beyond_{limit.name}", "?", "1", (), f"the largest motion passes {limit.meaning}") for limit in limits]

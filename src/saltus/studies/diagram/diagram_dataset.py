@@ -158,7 +158,7 @@ def _dots(search: DiagramSearch, rows: np.ndarray) -> xarray.Dataset:
         "period": (motions.period, {"long_name": "forcing periods after which it repeats"}),
         "impact_count": (motions.impact_count, {"long_name": "impacts in them"}),
     }
-    if model.contacts:
+    if model.names_its_contacts:
         columns["slowest"] = motions.slowest, angle | {"long_name": "least speed of an impact, 0 without impacts"}
     for i, name in enumerate(state_names(model.coordinates)):
         columns[name] = motions.last[:, i], angle | {"long_name": f"{name} at phase 0"}

@@ -154,7 +154,7 @@ def _lagrange(nodes: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarr
 
 def _slowest(orbit: PeriodicOrbit) -> float:
     """The least speed of an impact of an orbit, at least `SETTINGS.slow`; 0 for models with one contact, as motions have it."""
-    if not orbit.system.model.contacts:
+    if not orbit.system.model.names_its_contacts:
         return 0.0
     return max(orbit.slowest if np.isfinite(orbit.slowest) else 0.0, SETTINGS.slow)
 
@@ -193,7 +193,7 @@ def placed(motions: SimulatedMotions, branches: list[PlacedBranch], mirrored: bo
         Whether a motion also lies on a branch if its mirror image does.
     """
     result = np.zeros(len(motions), dtype=bool)
-    least = SETTINGS.slow if branches and branches[0].branch.orbits[0].system.model.contacts else 0.0
+    least = SETTINGS.slow if branches and branches[0].branch.orbits[0].system.model.names_its_contacts else 0.0
     every = np.stack([motions.highest, motions.lowest, np.maximum(motions.slowest, least)], axis=1)
     sizes = np.maximum(motions.amplitude, SETTINGS.least)
     low, high, periods = motions.value.min(initial=np.inf), motions.value.max(initial=-np.inf), set(motions.period.tolist())

@@ -155,7 +155,7 @@ def followed(
         kept=SETTINGS.kept,
         extrema=True,
         impact_count=True,
-        speed=bool(system.model.contacts),
+        speed=system.model.names_its_contacts,
         tol=SETTINGS.tol,
         progress=progress,
     )

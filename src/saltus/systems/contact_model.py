@@ -1,0 +1,272 @@
+"""The contract of a model with several contacts or dry friction, and its accelerations while some of them hold.
+
+The accelerations take numbers, arrays or symbols.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from saltus.errors import ParameterError
+from saltus.systems.model import Model
+
+MOST_CONTACTS = 12  # Which contacts are closed is found by trying, with 2^n choices at worst.
+MOST_FRICTIONS = 6  # Which frictions stick, and which way the others slide, is found by trying 3^n choices at worst.
+
+
+class ContactModel(Model):
+    """An oscillator of one or more coordinates with several contacts, contacts that hold single coordinates, or dry friction:
+
+        M(q) q'' = r(t, q, v) + the reactions of closed contacts + the frictions.
+
+    Besides what a `Model` has (`coordinates`, `channels`, optional parts) give it:
+
+    1. `force`, r(t, q, v); its accelerations follow from it;
+    2. `mass_matrix`, M(q), symmetric and positive definite, where that is not the identity;
+    3. `contacts`, a tuple of `Contact`, each of which keeps one coordinate on one side of a position. While a contact is closed
+       it holds its coordinate as long as its reaction presses; impacts follow the system's law (`NewtonImpact`);
+    4. `frictions`, a tuple of `Friction`, and their `normal_forces` N(t, q, v), by default 1. A friction that sticks holds the
+       velocity of its coordinate. M(q) may connect no coordinate with a friction to one with a contact;
+    5. optionally `transfers` (whether an impact passes speed on to the other contacts of its group, as a crossing does) and
+       `singularity`, a name for where M(q) has no inverse: a motion that gets there ends with this name as `limit`.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> @dataclass(frozen=True, kw_only=True)
+    ... class Ball(saltus.ContactModel):
+    ...     coordinates = ("height",)
+    ...     contacts = (saltus.Contact(name="floor", coordinate="height"),)
+    ...     def force(self, t, height, velocity, load):
+    ...         return -1.0
+    >>> ball = saltus.System(model=Ball(), impact=saltus.NewtonImpact(e=0.5))
+    >>> saltus.simulate(ball, height=2.0, duration=3.0).impacts.time  # the fall from a height of 2
+    array([2.])
+    """
+
+    __slots__ = ()
+
+    transfers: ClassVar[bool] = False
+
+    def acceleration(self, t: Any, theta: Any, velocity: Any, side: Any, load: Any) -> Any:
+        """The acceleration M^-1 r without contacts and frictions.
+
+        Parameters
+        ----------
+        t
+            The dimensionless time tau.
+        theta
+            The coordinate q; a tuple where there are several.
+        velocity
+            Its rate, of the same kind.
+        side
+            Any number: there are no sides.
+        load
+            The load, whose channels are called with the time: `load.horizontal(t)`.
+        """
+        size = len(self.coordinates)
+        still = [0.0] * len(self.frictions)
+        solved = constrained_acceleration(self, t, theta, velocity, load, [1.0] * size, still)
+        return solved[0] if size == 1 else tuple(solved)
+
+    def reaches(self, coordinate: str, values: Any) -> Any:
+        """Whether a coordinate can have these values: where the gap of none of its contacts is negative.
+
+        Parameters
+        ----------
+        coordinate
+            Its name.
+        values
+            The values, an array.
+        """
+        gaps = [np.asarray(contact.gap(values)) for contact in self.contacts if contact.coordinate == coordinate]
+        return np.min(gaps or [np.zeros(np.shape(values))], axis=0) >= 0.0
+
+    def force(self, t: Any, theta: Any, velocity: Any, load: Any) -> Any:
+        """r(t, q, v) of M(q) q'' = r, while no contact and no friction acts.
+
+        Parameters
+        ----------
+        t
+            The dimensionless time tau.
+        theta
+            The coordinate q; a tuple where there are several.
+        velocity
+            Its rate, of the same kind.
+        load
+            The load, whose channels are called with the time: `load.horizontal(t)`.
+        """
+        raise NotImplementedError(f"{type(self).__name__} must define force(t, theta, velocity, load)")
+
+    def mass_matrix(self, theta: Any) -> Any:
+        """M(q): a number, or rows of numbers, symmetric and positive definite.
+
+        Parameters
+        ----------
+        theta
+            The coordinate q; a tuple where there are several.
+        """
+        size = len(self.coordinates)
+        return 1.0 if size == 1 else [[float(i == j) for j in range(size)] for i in range(size)]
+
+    def normal_forces(self, t: Any, theta: Any, velocity: Any, load: Any) -> tuple[Any, ...]:
+        """The normal force N of each friction; the motion ends where one is not positive. By default it is 1, so that mu N is mu.
+
+        Parameters
+        ----------
+        t
+            The dimensionless time tau.
+        theta
+            The coordinate q; a tuple where there are several.
+        velocity
+            Its rate, of the same kind.
+        load
+            The load, whose channels are called with the time.
+        """
+        return (1.0,) * len(self.frictions)
+
+
+def check_contact_model(model: ContactModel) -> None:
+    """Refuse contacts and frictions that have no meaning.
+
+    Raises
+    ------
+    ParameterError
+        Sides; too many parts or two of one name; an unknown coordinate, or one that two parts hold; two contacts that leave it no
+        room; a coefficient of friction below 0; mu_s < mu_k.
+    """
+    contacts, frictions, kind = model.contacts, model.frictions, type(model).__name__
+    if model.sides:
+        raise ParameterError(f"{kind} is a ContactModel, so it has no sides: leave them out", "model")
+    for what, count, most in (("contacts", len(contacts), MOST_CONTACTS), ("frictions", len(frictions), MOST_FRICTIONS)):
+        if count > most:
+            raise ParameterError(f"{kind} has {count} {what}, and at most {most} can be followed", "model")
+    names = [*(contact.name for contact in contacts), *(friction.name for friction in frictions)]
+    if len(set(names)) < len(names):
+        raise ParameterError(f"contacts and frictions of {kind} must have names of their own, got {', '.join(names)}", "model")
+    for contact in contacts:
+        if contact.coordinate not in model.coordinates:
+            known = ", ".join(model.coordinates)
+            raise ParameterError(f"the contact {contact.name!r} holds {contact.coordinate!r}, but {kind} has {known}", "model")
+    for a in contacts:
+        for b in contacts:
+            if a is not b and a.coordinate == b.coordinate and not (a.sign != b.sign and b.gap(a.position) > 0.0):
+                raise ParameterError(f"the contacts {a.name!r} and {b.name!r} leave {a.coordinate} no room between them", "model")
+    _check_frictions(model)
+
+
+def _check_frictions(model: ContactModel) -> None:
+    """Refuse frictions on coordinates that they cannot hold, or with coefficients without meaning."""
+    kind, taken = type(model).__name__, [contact.coordinate for contact in model.contacts]
+    for friction in model.frictions:
+        where = f"the friction {friction.name!r} of {kind}"
+        if friction.coordinate not in model.coordinates:
+            raise ParameterError(f"{where} holds {friction.coordinate!r}, none of {', '.join(model.coordinates)}", "model")
+        if friction.coordinate in taken:
+            raise ParameterError(f"{where} and something else hold {friction.coordinate}: take two coordinates", "model")
+        if not 0.0 <= float(friction.kinetic) <= float(friction.most):
+            pair = f"kinetic = {float(friction.kinetic):g} and static = {float(friction.most):g}"
+            raise ParameterError(f"{where} must have 0 <= kinetic <= static, got {pair}", "model")
+        taken.append(friction.coordinate)
+
+
+def constrained_acceleration(
+    model: Model, t: Any, q: Any, v: Any, load: Any, free: Sequence[Any], slides: Sequence[Any] = ()
+) -> list[Any]:
+    """The accelerations a of (D M D + 1 - D) a = D r, with D = diag(free): 1 where a coordinate is free, 0 where it is held.
+
+    r has the force of each friction that slides, -mu_k N s with its direction s in `slides`, 0 where it sticks.
+
+    q and v are scalars where there is one coordinate, else tuples. The matrix is eliminated from its first row on, without
+    exchanging rows, as the pivots of a positive definite matrix are positive.
+    """
+    mass, force = mass_and_force(model, t, q, v, load)
+    for friction, normal, s in zip(model.frictions, normal_forces(model, t, q, v, load), slides, strict=True):
+        place = model.coordinates.index(friction.coordinate)
+        force[place] = force[place] - s * friction.kinetic * normal
+    size = len(force)
+    matrix = [[_held(mass[i][j], i, j, free) for j in range(size)] for i in range(size)]
+    right = [free[i] * force[i] for i in range(size)]
+    for k in range(size):
+        for i in range(k + 1, size):
+            if _is_zero(matrix[i][k]):
+                continue
+            factor = matrix[i][k] / matrix[k][k]
+            for j in range(k + 1, size):
+                matrix[i][j] = matrix[i][j] - factor * matrix[k][j]
+            right[i] = right[i] - factor * right[k]
+    solved: list[Any] = [0.0] * size
+    for i in reversed(range(size)):
+        value = right[i]
+        for j in range(i + 1, size):
+            if not _is_zero(matrix[i][j]):
+                value = value - matrix[i][j] * solved[j]
+        solved[i] = value / matrix[i][i]
+    return solved
+
+
+def reactions(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any) -> list[Any]:
+    """The force of each contact along its sign, sign (M a - r)_i; 0 where its coordinate is free."""
+    lacking = _lacking(model, t, q, v, a, load)
+    return [contact.sign * lacking[model.coordinates.index(contact.coordinate)] for contact in model.contacts]
+
+
+def stick_margins(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any) -> list[Any]:
+    """mu_s N - l and mu_s N + l of each friction, one after the other, with the force l = (M a - r)_i that makes it stick."""
+    lacking, margins = _lacking(model, t, q, v, a, load), []
+    for friction, normal in zip(model.frictions, normal_forces(model, t, q, v, load), strict=True):
+        force, most = lacking[model.coordinates.index(friction.coordinate)], friction.most * normal
+        margins += [most - force, most + force]
+    return margins
+
+
+def normal_forces(model: Any, t: Any, q: Any, v: Any, load: Any) -> tuple[Any, ...]:
+    """The normal force N of each friction.
+
+    Raises
+    ------
+    ParameterError
+        The model does not give as many as it has frictions.
+    """
+    given = model.normal_forces(t, q, v, load) if model.frictions else ()
+    if len(given) != len(model.frictions):
+        kind, count = type(model).__name__, len(model.frictions)
+        raise ParameterError(f"{kind}.normal_forces must return {count} value(s), one for each friction, got {given!r}", "model")
+    return tuple(given)
+
+
+def _lacking(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any) -> list[Any]:
+    """M a - r, the force that must act on each coordinate besides r for these accelerations."""
+    mass, force = mass_and_force(model, t, q, v, load)
+    return [sum(m * x for m, x in zip(row, a, strict=True) if not _is_zero(m)) - r for row, r in zip(mass, force, strict=True)]
+
+
+def apart(model: Model, mass: Sequence[Sequence[Any]]) -> bool:
+    """Whether the mass matrix connects no coordinate with a contact to one with a friction, whatever the state."""
+    names, near = model.coordinates, {contact.coordinate for contact in model.contacts}
+    for _ in names:
+        near |= {b for a in near for b in names if not _is_zero(mass[names.index(a)][names.index(b)])}
+    return not any(friction.coordinate in near for friction in model.frictions)
+
+
+def mass_and_force(model: Any, t: Any, q: Any, v: Any, load: Any) -> tuple[list[list[Any]], list[Any]]:
+    """M(q) as rows and r(t, q, v) as a list, for any number of coordinates."""
+    mass, force = model.mass_matrix(q), model.force(t, q, v, load)
+    if len(model.coordinates) == 1:
+        return [[mass]], [force]
+    return [list(row) for row in mass], list(force)
+
+
+def _held(entry: Any, i: int, j: int, free: Sequence[Any]) -> Any:
+    """An entry of D M D + 1 - D."""
+    if i != j:
+        return 0.0 if _is_zero(entry) else free[i] * free[j] * entry
+    return 1.0 if isinstance(entry, float) and entry == 1.0 else free[i] * entry + (1.0 - free[i])
+
+
+def _is_zero(entry: Any) -> bool:
+    """Whether an entry is 0 for every state: the number 0, and not a symbol or an array."""
+    return isinstance(entry, (int, float)) and entry == 0

@@ -1,0 +1,293 @@
+"""Impact laws: the velocity just after an impact, and the change of energy (paper, section "Impact scenarios")."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.checks import check_number, settle_numbers
+from saltus.errors import ParameterError
+from saltus.public_functions import answered
+from saltus.systems.contact import Contact
+from saltus.systems.contact_model import ContactModel
+from saltus.systems.load import Load
+from saltus.systems.model import Model
+from saltus.systems.one_contact_model import OneContactModel
+
+
+class ImpactLaw:
+    """The law by which the velocity and side before an impact give those after it, v-, s -> v+, s+, for any model.
+
+    `velocity_after` is traced, and may use comparisons within NumPy's where, and maximum and minimum, besides what an
+    acceleration may use.
+    """
+
+    __slots__ = ()
+
+    def velocity_after(self, model: OneContactModel, t: Any, velocity: Any, side: Any, next_side: Any, load: Load) -> Any:
+        """The velocity after an impact at `t` through which the motion passes from `side` to `next_side`.
+
+        Both velocities are rates of the coordinate, and the result has the sign of `velocity`: where the motion bounces, the
+        model's `reset` turns the sign.
+        """
+        raise NotImplementedError
+
+    def check_one_contact(self, model: OneContactModel) -> None:
+        """Refuse, with a ParameterError, a model with one contact for which this law has no meaning.
+
+        Parameters
+        ----------
+        model
+            The model.
+        """
+        if type(self).velocity_after is ImpactLaw.velocity_after:
+            raise ParameterError(
+                f"{type(self).__name__} has no velocity_after, which a {type(model).__name__} with its one contact needs; give "
+                "VelocityReduction(e=...)",
+                "impact",
+            )
+
+    def restitution_matrix(self, model: Model) -> list[list[Any]]:
+        """E of the impacts of a model with contacts, 0 <= J _|_ v+ + E v- >= 0, rows and columns in the order of its contacts.
+
+        J are the impulses, and v the rates of the gaps, at all contacts whose gap is 0.
+
+        Raises
+        ------
+        ParameterError
+            A law that has no meaning for several contacts.
+        """
+        raise ParameterError(
+            f"{type(self).__name__} is no law for the contacts of a {type(model).__name__}; give NewtonImpact(e=...)", "impact"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class VelocityReduction(ImpactLaw):
+    """v+ = e v-, with a constant factor e in [0, 1] (paper, `vel_red`).
+
+    In a model with several contacts the others of the group take over the speed if the model `transfers`; else each contact
+    turns its own speed back.
+
+    Parameters
+    ----------
+    e
+        The factor of the velocity, in [0, 1].
+
+    Examples
+    --------
+    >>> lossy = saltus.System(model=system.model, load=system.load, impact=saltus.VelocityReduction(e=0.8))
+    >>> impacts = saltus.simulate(lossy, theta=0.3, periods=2).impacts
+    >>> bool(np.allclose(impacts.velocity_after / impacts.velocity_before, 0.8))
+    True
+    """
+
+    e: float = 1.0
+
+    def __post_init__(self) -> None:
+        settle_numbers(self, "e", at_least=0.0, at_most=1.0)
+
+    def velocity_after(self, model: OneContactModel, t: Any, velocity: Any, side: Any, next_side: Any, load: Load) -> Any:
+        """e v-."""
+        return self.e * velocity
+
+    def restitution_matrix(self, model: Model) -> list[list[Any]]:
+        """e at the contact that is hit or, if the model `transfers`, at the others of its group."""
+        contacts = model.contacts
+        return [[self.e if _passes(model, a, b) else 0.0 for a in contacts] for b in contacts]
+
+
+def _passes(model: Any, a: Contact, b: Contact) -> bool:
+    """Whether an impact at contact `a` gives its speed to `b`: another one of its group if the model `transfers`, else itself."""
+    return a is not b and a.group == b.group if model.transfers else a is b
+
+
+@dataclass(frozen=True, slots=True)
+class EnergyRestitution(ImpactLaw):
+    """T+ = r T-, with T the model's kinetic energy, ground velocities and unequal masses included (`rest_def`, errata 5, 26).
+
+    T on the new side is a quadratic a v^2 + b v + c in the velocity. The root with the sign of v- is taken; if both have this
+    sign, the one on the same side of the minimum -b / (2 a) as v-. At r = 1 this gives v+ = v- for m = 0 and nu' = 0. If no root
+    has the sign of v- (small v- on a moving ground) the motion cannot go on, and is refused with the instant and the numbers.
+
+    Parameters
+    ----------
+    r
+        The share of the kinetic energy that an impact leaves, above 0 and at most 1.
+
+    Examples
+    --------
+    >>> ball = saltus.System(model=saltus.WallOscillator(), impact=saltus.EnergyRestitution(r=0.25))
+    >>> float(saltus.simulate(ball, x=-2.0, duration=3.0).impacts.velocity_after[0] / -(3**0.5))  # a quarter of the energy
+    0.5000000000000006
+    """
+
+    r: float
+
+    def __post_init__(self) -> None:
+        settle_numbers(self, "r", above=0.0, at_most=1.0)
+
+    def velocity_after(self, model: OneContactModel, t: Any, velocity: Any, side: Any, next_side: Any, load: Load) -> Any:
+        """The root v+ of a v^2 + b v + c = r T(v-); NaN where there is none."""
+
+        def after(v: Any) -> Any:
+            return model.kinetic_energy(t, model.contact, v, next_side, load)
+
+        c = after(0.0)
+        a = (after(1.0) + after(-1.0)) / 2 - c
+        b = (after(1.0) - after(-1.0)) / 2
+        energy = self.r * model.kinetic_energy(t, model.contact, velocity, side, load)
+        lowest = -b / (2 * a)
+        square = (energy - c) / a + lowest * lowest
+        reach = np.sqrt(np.maximum(square, 0.0))
+        branch = np.where(velocity > lowest, 1.0, -1.0)
+        nearer, other = lowest + branch * reach, lowest - branch * reach
+        through = np.where(nearer * velocity > 0, nearer, other)
+        return np.where(square >= 0, np.where(through * velocity > 0, through, np.nan), np.nan)
+
+
+@dataclass(frozen=True, slots=True)
+class InelasticImpact(ImpactLaw):
+    """Frictionless, perfectly inelastic contact: the momentum balance of the layer that is not hit fixes v+ (errata 25).
+
+    For the metainterface v+ = -cos(2 beta0) v- from lower to upper and -cos(2 beta0)/(1+m) v- back, whatever the ground does, for
+    45 to 135 degrees; outside that range both contacts act and the motion stops. For the rocking block it is Housner's factor.
+
+    Examples
+    --------
+    >>> inelastic = saltus.System(model=system.model, load=system.load, impact=saltus.InelasticImpact())
+    >>> impacts = saltus.simulate(inelastic, theta=0.3, periods=1).impacts
+    >>> float(impacts.velocity_after[0] / impacts.velocity_before[0] + np.cos(2 * system.model.beta0))
+    0.0
+    """
+
+    def velocity_after(self, model: OneContactModel, t: Any, velocity: Any, side: Any, next_side: Any, load: Load) -> Any:
+        """The model's `inelastic_factor` times v-."""
+        return model.inelastic_factor(side) * velocity
+
+    def restitution_matrix(self, model: Model) -> list[list[Any]]:
+        """All zeros: no contact gives speed back, and the balance of momentum determines the other velocities."""
+        return [[0.0] * len(model.contacts) for _ in model.contacts]
+
+
+class Factors(tuple[Any, ...]):
+    """A tuple of numbers of a law, which a trace replaces by symbols: `impact.e.0`, `impact.e.1`, ..."""
+
+    __slots__ = ()
+
+
+@dataclass(frozen=True, slots=True)
+class NewtonImpact(ImpactLaw):
+    """0 <= J _|_ v+ + E v- >= 0 at all contacts whose gap is 0, with the rates v of the gaps and the impulses J (Moreau).
+
+    A model with one contact has no other one to which an impact could pass speed: a wall turns the velocity round to -e v-. A
+    motion that passes through its contact closes one and opens another at once, v+ = g v-, and does not bounce: e must be 0.
+
+    E has the restitution of each contact on its diagonal, the transfer g between contacts of one group, and 0 elsewhere. A
+    contact with an impulse has after the impact the rate -e_i v_i- less g times the rates v- of the others in its group. For
+    g = 0 the energy lost at an impact is 1/2 sum J_i (1 - e_i) |v_i-| on fixed ground. A transfer may raise the energy: see
+    `energy_gain`.
+
+    Parameters
+    ----------
+    e
+        The restitution of all contacts, or a tuple with one for each in the order of the model; in [0, 1].
+    transfer
+        g, in [0, 1].
+
+    Examples
+    --------
+    >>> stops = saltus.System(model=saltus.TwoStops(stiffness=0.0), impact=saltus.NewtonImpact(e=0.5))
+    >>> [float(event.velocity_after[0]) for event in saltus.simulate(stops, x=0.0, velocity=1.0, duration=4.0).events]
+    [-0.5]
+    """
+
+    e: Any = 0.0
+    transfer: float = 0.0
+
+    def __post_init__(self) -> None:
+        settle_numbers(self, "transfer", at_least=0.0, at_most=1.0)
+        several = isinstance(self.e, (tuple, list))
+        for i, value in enumerate(self.e if several else (self.e,)):
+            check_number(f"e.{i}" if several else "e", value, at_least=0.0, at_most=1.0)
+        object.__setattr__(self, "e", Factors(float(x) for x in self.e) if several else float(self.e))
+
+    def velocity_after(self, model: OneContactModel, t: Any, velocity: Any, side: Any, next_side: Any, load: Load) -> Any:
+        """e v- at a wall, whose reset turns its sign, and g v- at a contact that the motion passes."""
+        (e,) = self.e if isinstance(self.e, Factors) else (self.e,)
+        return (e if len(model.sides) == 1 else self.transfer) * velocity
+
+    def check_one_contact(self, model: OneContactModel) -> None:
+        """Refuse several values of e, and a bounce in a model that passes its contact."""
+        values = self.e if isinstance(self.e, Factors) else (self.e,)
+        if len(values) != 1:
+            raise ParameterError(f"impact.e must have 1 value for a {type(model).__name__}, got {len(values)}", "impact.e")
+        if len(model.sides) == 2 and values[0] != 0.0:
+            raise ParameterError(
+                f"a {type(model).__name__} passes its contact and does not bounce there, so that impact.e must be 0, got "
+                f"{values[0]:g}; VelocityReduction(e=...) and NewtonImpact(transfer=...) say how much speed passes",
+                "impact.e",
+            )
+
+    def restitution_matrix(self, model: Model) -> list[list[Any]]:
+        """E; a contact's own restitution takes the place of the law's if it has one."""
+        contacts = model.contacts
+        factors = self.e if isinstance(self.e, Factors) else (self.e,) * len(contacts)
+        if len(factors) != len(contacts):
+            names = ", ".join(contact.name for contact in contacts)
+            raise ParameterError(f"impact.e must have {len(contacts)} value(s), for {names}, got {len(factors)}", "impact.e")
+        matrix: list[list[Any]] = [[self.transfer * (a.group == b.group) for a in contacts] for b in contacts]
+        for i, (contact, factor) in enumerate(zip(contacts, factors, strict=True)):
+            matrix[i][i] = factor if contact.restitution is None else contact.restitution
+        return matrix
+
+
+@answered
+def energy_gain(model: ContactModel, impact: ImpactLaw) -> dict[str, float]:
+    """The largest relative gain of kinetic energy by an impact at each contact; the energy is not raised where it is <= 0.
+
+    The contacts of all other coordinates are taken as closed and at rest. The rates of the gaps after the impact are then -E v-
+    where an impulse acts, coordinates without a contact keep their momentum, and the gain is (v+' M v+) / (v-' M v-) - 1, on
+    fixed ground and in the position where these contacts are closed. For two layers it is positive where
+    M_ss e_s^2 + 2 cos(2 beta0) e_s g + M_jj g^2 > M_ss, s the layer that is hit.
+
+    Parameters
+    ----------
+    model
+        A model with several contacts.
+    impact
+        The impact law.
+
+    Examples
+    --------
+    >>> heavy = saltus.TwoLayer(beta0=np.deg2rad(80), mass_ratio=0.7)
+    >>> saltus.energy_gain(heavy, saltus.NewtonImpact(transfer=1.0))["upper"]  # the lower mass is heavier by that share
+    0.7
+    """
+    return {name: float(share) for name, share in energy_gains(model, impact).items()}
+
+
+def energy_gains(model: Any, impact: Any, shape: tuple[int, ...] = ()) -> dict[str, np.ndarray]:
+    """`energy_gain` of a model and a law, or of copies of them (see `substitute`) whose numbers are arrays of this shape."""
+    contacts, names = model.contacts, model.coordinates
+    places = [names.index(contact.coordinate) for contact in contacts]
+    matrix, gain = impact.restitution_matrix(model), {}
+    size, free = len(names), [k for k in range(len(names)) if k not in places]
+    for s, contact in enumerate(contacts):
+        before, after, q = np.zeros(size), [0.0] * size, [np.zeros(shape)] * size
+        for j, other in enumerate(contacts):
+            if j == s or other.coordinate != contact.coordinate:
+                q[places[j]], after[places[j]] = q[places[j]] + other.position, other.sign * matrix[j][s]
+        before[places[s]] = -contact.sign
+        given = model.mass_matrix(q[0] if size == 1 else tuple(q))
+        entries = np.broadcast_arrays(*after, *([given] if size == 1 else [entry for row in given for entry in row]))
+        table = np.stack([entry.astype(float) for entry in entries], axis=-1)
+        left, mass = table[..., :size].copy(), table[..., size:].reshape(*table.shape[:-1], size, size)
+        if free:
+            pushed = (mass @ (left - before)[..., None])[..., free, :]
+            left[..., free] = -np.linalg.solve(mass[..., free, :][..., free], pushed)[..., 0]
+        energy = [(v * (mass @ v[..., None])[..., 0]).sum(axis=-1) for v in (left, before)]
+        gain[contact.name] = energy[0] / energy[1] - 1.0
+    return gain

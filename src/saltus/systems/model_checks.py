@@ -1,0 +1,137 @@
+"""The checks of a model that are made when a system is made of it, so that none fails only when it is first simulated."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from functools import cache
+from types import FunctionType
+from typing import Any
+
+import numpy as np
+
+from saltus.errors import ParameterError, SaltusError, shown
+from saltus.systems.contact_model import ContactModel, check_contact_model
+from saltus.systems.impact_laws import ImpactLaw
+from saltus.systems.load import DeclaredLoad, Load
+from saltus.systems.model import Model
+from saltus.systems.one_contact_model import OneContactModel, check_one_contact
+
+# The parts of the contracts of the two siblings: a class that defines one of them and is of neither has the wrong base.
+OWN_PARTS = {
+    OneContactModel: ("sides", "gap", "reset", "inelastic_factor"),
+    ContactModel: ("contacts", "frictions", "force", "mass_matrix", "normal_forces", "transfers"),
+}
+OFF_CONTACT = 1e-9  # the largest gap at the contact, relative to its rate, that may be rounding; an error of a model is larger
+PROBE = (0.37, 0.21, 0.13)  # time, coordinate and velocity at which a model's answers are counted: any numbers would do
+
+
+def check_works(model: Model) -> None:
+    """Refuse a model that cannot be simulated: parts of another class of models, parts that are missing or of the wrong size.
+
+    Raises
+    ------
+    ParameterError
+        The error names the class and what is wrong.
+    """
+    _check_class(type(model))
+    if isinstance(model, OneContactModel):
+        check_one_contact(model)
+    if isinstance(model, ContactModel):
+        check_contact_model(model)
+    if type(model) not in _probed:
+        _probe(model)
+        _probed.add(type(model))
+
+
+_probed = set[type[Model]]()  # classes of which one model has answered, as systems are made by the thousand
+
+
+@cache
+def _check_class(kind: Any) -> None:
+    """Refuse a class that lacks its equation of motion, or has parts that only another class of models has."""
+    for base, parts in OWN_PARTS.items():
+        given = [name for name in parts if getattr(kind, name, ()) not in ((), getattr(Model, name, None))]
+        if given and not issubclass(kind, base):
+            raise ParameterError(
+                f"{kind.__name__} defines {given[0]}, so its base class must be saltus.{base.__name__}, not "
+                f"{kind.__mro__[1].__name__}",
+                "model",
+            )
+    if issubclass(kind, ContactModel):
+        if kind.force is ContactModel.force and kind.acceleration is ContactModel.acceleration:
+            raise ParameterError(f"{kind.__name__} must define force(t, q, velocity, load)", "model")
+    elif kind.acceleration is Model.acceleration:
+        raise ParameterError(f"{kind.__name__} must define acceleration(t, q, velocity, side, load)", "model")
+    for base in (OneContactModel, ContactModel):
+        for name, function in {**vars(Model), **vars(base)}.items():
+            if isinstance(function, FunctionType) and not name.startswith("_") and issubclass(kind, base):
+                _check_arguments(kind, name, function)
+
+
+def _check_arguments(kind: type[Model], name: str, function: FunctionType) -> None:
+    """Refuse a method that does not take the arguments of the contract's."""
+    wanted = list(inspect.signature(function).parameters)
+    try:
+        inspect.signature(getattr(kind, name)).bind(*wanted)
+    except TypeError:
+        raise ParameterError(f"{kind.__name__}.{name} must take the arguments {', '.join(wanted)}", "model") from None
+
+
+def check_contact(model: OneContactModel, impact: ImpactLaw) -> None:
+    """Refuse a gap that is not 0 at `contact`, and a reset that sends the motion beyond the contact.
+
+    Raises
+    ------
+    ParameterError
+        The error has the numbers.
+    """
+    point, name = float(model.contact), type(model).__name__
+    rates = {side: float(model.gap(point + 0.5, side)) - float(model.gap(point - 0.5, side)) for side in model.sides}
+    for side, rate in rates.items():
+        at = float(model.gap(point, side))
+        if rate == 0.0:
+            raise ParameterError(f"{name}.gap must depend on the coordinate, such as side * (x - d)", "model")
+        if abs(at) > OFF_CONTACT * abs(rate):
+            raise ParameterError(
+                f"{name}.gap must be 0 at {name}.contact = {point:g}, got {at:g} on side {side}; give both", "model"
+            )
+        before = -math.copysign(1.0, rate)
+        answer = _asked(model, "reset", 0.0, before, side, Load(), impact)
+        if answer is None:
+            continue
+        following, after = answer
+        if rates.get(int(following), 0.0) * after < 0.0:
+            raise ParameterError(
+                f"{name}.reset sends the motion beyond the contact: on side {side} the velocity {before:g} becomes "
+                f"{float(after):g} on side {int(following)}; velocities are rates of the coordinate, and "
+                + (
+                    "a bounce turns the sign of what impact.velocity_after returns" if following == side else "a passage keeps it"
+                ),
+                "model",
+            )
+
+
+def _probe(model: Model) -> None:
+    """Refuse a model whose equations fail at a state by a mistake of its author, or have other sizes than its coordinates."""
+    size, (t, q, v), load = len(model.coordinates), PROBE, DeclaredLoad(Load(frequency=1.0), model)
+    state: tuple[Any, Any] = (q, v) if size == 1 else ((q,) * size, (v,) * size)
+    for side in model.every_side:
+        found = _asked(model, "acceleration", t, *state, side, load)
+        count = len(found) if isinstance(found, (tuple, list)) else 1
+        if found is not None and count != size:
+            raise ParameterError(f"{type(model).__name__}.acceleration must return {size} value(s), got {shown(found)}", "model")
+
+
+def _asked(model: Model, method: str, *arguments: Any) -> Any:
+    """What a method of a model answers; None where its numbers have no value there. Errors of saltus go on."""
+    try:
+        with np.errstate(all="ignore"):
+            return getattr(model, method)(*arguments)
+    except (SaltusError, KeyboardInterrupt):
+        raise
+    except Exception as error:  # a user's own code may raise anything; what depends on the kind of numbers is said by the trace
+        if not isinstance(error, NameError) and getattr(error, "obj", None) is not model:
+            return None
+        name = f"{type(model).__name__}.{method}"
+        raise ParameterError(f"{name} fails: {type(error).__name__}: {error}", "model") from error
