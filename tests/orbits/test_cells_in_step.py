@@ -6,7 +6,7 @@ import pytest
 import saltus
 from saltus.orbits import same_orbit
 from saltus.orbits.finding import near_returns
-from saltus.studies.diagram.placement import PlacedBranch, placed
+from saltus.studies.diagram.branch_set import PlacedBranch, placed
 from saltus.studies.diagram.simulated import simulate_from
 
 BETA80 = np.deg2rad(80)

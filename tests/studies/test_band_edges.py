@@ -8,11 +8,10 @@ from shared_systems import forced
 
 from saltus import continue_orbit, find_orbit
 from saltus.orbits import SpecialKind, switch_branch
-from saltus.studies.diagram.band_edges import band_origins, explained, turning_points
-from saltus.studies.diagram.bands import EdgeKind
+from saltus.studies.diagram.bands import EdgeKind, band_origins, explained, turning_points
 from saltus.studies.diagram.chaos_search import BandSearch
-from saltus.studies.diagram.chaos_settings import SETTINGS
 from saltus.studies.diagram.diagram_work import DiagramWork
+from saltus.studies.diagram.effort import CHAOS
 from saltus.studies.diagram.simulated import simulate_from
 
 FREQUENCY, BOUNDS = "load.frequency", (0.36, 0.402)
@@ -33,7 +32,7 @@ def branches():
 def bands(branches):
     values = np.linspace(*BOUNDS, 15)
     states = np.random.default_rng(3).uniform(-0.2, 0.2, (15 * 4, 2))
-    system, settings = forced(0.2), replace(SETTINGS, step=0.02, fine_step=0.01, edge=2e-3)
+    system, settings = forced(0.2), replace(CHAOS, step=0.02, fine_step=0.01, edge=2e-3)
     begun = simulate_from(system, FREQUENCY, np.repeat(values, 4), states, 300)
     search = BandSearch(DiagramWork(system, FREQUENCY), BOUNDS, settings)
     search.look(begun, band_origins(branches))

@@ -10,11 +10,10 @@ from saltus import ParameterError, WallOscillator, continue_orbit, find_orbit
 from saltus.flow import Ending, find_recurrence
 from saltus.orbits import SpecialKind
 from saltus.studies import chaotic_bands
-from saltus.studies.diagram.band_edges import band_origins
-from saltus.studies.diagram.bands import Band, Edge, EdgeKind, band_dataset
+from saltus.studies.diagram.bands import Band, Edge, EdgeKind, band_dataset, band_origins
 from saltus.studies.diagram.chaos_search import BandSearch
-from saltus.studies.diagram.chaos_settings import SETTINGS
 from saltus.studies.diagram.diagram_work import DiagramWork
+from saltus.studies.diagram.effort import CHAOS
 from saltus.studies.diagram.simulated import simulate_from, starts_at
 from saltus.systems import Harmonic, Load, System
 from saltus.window import check_window
@@ -24,7 +23,7 @@ AMPLITUDE, FREQUENCY = "load.horizontal.amplitude", "load.frequency"
 
 
 # The default steps are shares of a figure's range; over the narrow ranges of these tests larger ones are as fine.
-COARSE = replace(SETTINGS, step=0.01, fine_step=0.005, edge=1e-3)
+COARSE = replace(CHAOS, step=0.01, fine_step=0.005, edge=1e-3)
 
 
 def bands(system, path, bounds, count=9, starts=4, settings=COARSE):
@@ -82,14 +81,14 @@ def test_the_brackets_of_edges_are_narrow(quasi_periodic_band):
 def test_bands_exclude_long_transients_and_the_more_so_beside_transients():
     """A mean life L is excluded with 95 % if none of the motions, all together, has settled within 3 L forcing periods."""
     found = bands(forced(3.0), FREQUENCY, (1.784, 1.82), count=13)
-    tried, beside, longest = found.tried, 0, SETTINGS.judgements[-1].exposure / 3.0
+    tried, beside, longest = found.tried, 0, CHAOS.judgements[-1].exposure / 3.0
     for band in found.bands:
         within = (tried.values >= band.low) & (tried.values <= band.high)
-        assert 3.0 * tried.life[within].sum() >= SETTINGS.judgements[1].exposure
+        assert 3.0 * tried.life[within].sum() >= CHAOS.judgements[1].exposure
         for edge in (band.lower, band.upper):
             inner, outer = np.searchsorted(tried.values, [edge.inner, edge.outer])
             if tried.verdict[outer] == Ending.TRANSIENT:
-                assert tried.life[inner] >= min(SETTINGS.longer * tried.life[outer], longest)
+                assert tried.life[inner] >= min(CHAOS.longer * tried.life[outer], longest)
                 beside += tried.life[outer] > 1000.0
     assert beside  # such transients are longer than those that the first judgement excludes
 
@@ -186,7 +185,7 @@ def test_an_interval_at_whose_ends_no_motion_is_left_to_begin_with_is_halved_all
     """There a motion of a long period was judged, of which no state is kept as settled: such an interval was tried for ever."""
     search = BandSearch(DiagramWork(forced(0.2), FREQUENCY), (0.0, 1.0))
     for value in (0.5, 0.5005):
-        search.place(value).period = SETTINGS.long_period + 1
+        search.place(value).period = CHAOS.long_period + 1
     search.refine()
     values = [place.value for place in search.places]
     assert values == pytest.approx([0.5, 0.50025, 0.5005], rel=1e-9)

@@ -9,8 +9,8 @@ from shared_systems import forced
 from saltus import stability_chart
 from saltus.flow import Ending
 from saltus.studies.diagram.chaos_search import BandSearch
-from saltus.studies.diagram.chaos_settings import SETTINGS
 from saltus.studies.diagram.diagram_work import DiagramWork
+from saltus.studies.diagram.effort import CHAOS
 from saltus.studies.diagram.simulated import simulate_from
 
 AMPLITUDE = "load.horizontal.amplitude"
@@ -28,7 +28,7 @@ def test_a_row_of_fig_14_and_the_diagram_along_it_have_chaos_at_the_same_values(
     in_chart = open_ & (row["verdict"].values == Ending.CHAOTIC)
     states = np.random.default_rng(4).uniform(-1.5, 1.5, (len(values) * 24, 2))
     begun = simulate_from(system, AMPLITUDE, np.repeat(values, 24), states, 300)
-    settings = replace(SETTINGS, step=0.02, fine_step=0.02, edge=2e-3)
+    settings = replace(CHAOS, step=0.02, fine_step=0.02, edge=2e-3)
     search = BandSearch(DiagramWork(system, AMPLITUDE), (low, high), settings)
     search.look(begun)
     bands = search.bands

@@ -14,7 +14,7 @@ from saltus.flow import Ending, Stop
 from saltus.orbits import initial_states, orbits_near_returns, search_orbits, solved_near
 from saltus.plots import draw_diagram, draw_stability_chart
 from saltus.studies import bifurcation_diagram, bordered_chart, response_spectrum, stability_chart
-from saltus.studies.chart.cell_outcomes import CellOutcome
+from saltus.studies.chart.motions import CellOutcome
 from saltus.studies.diagram.chaos_search import BandOrigin, BandSearch
 from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.effort import EFFORTS, Effort

@@ -35,7 +35,7 @@ def states_within(system, window, count=6):
 def by_attractors(system, window):
     middle = 0.03 if window < 0.1 else 0.0
     bounds = ((middle - window, middle + window), (-window, window))
-    return find_attractors(system, window=bounds, starts=3)
+    return find_attractors(system, window=bounds, starts=1)
 
 
 def by_chart(system, window):

@@ -4,7 +4,7 @@ import numpy as np
 from shared_systems import forced
 
 from saltus import continue_orbit, find_orbit
-from saltus.studies.diagram.placement import PlacedBranch
+from saltus.studies.diagram.branch_set import PlacedBranch
 from saltus.studies.diagram.simulated import SETTINGS, followed, simulate_from
 
 FREQUENCY = "load.frequency"

@@ -11,7 +11,7 @@ import saltus
 from saltus.branch_tables import branches_of
 from saltus.orbits import orbits_of
 from saltus.studies import bifurcation_diagram
-from saltus.studies.diagram.diagram_dataset import confirmed
+from saltus.studies.diagram.diagram_study import confirmed
 from saltus.studies.diagram.diagram_work import DiagramWork
 
 SLOW = forced(H=0.15, W=0.2, e=0.3)

@@ -9,7 +9,7 @@ import numpy as np
 
 from saltus.attractors.orbit_certificate import certify
 from saltus.attractors.stroboscopic_section import check_periodic
-from saltus.attractors.zero_one import ZeroOne, zero_one_of_bands
+from saltus.attractors.zero_one import FEWEST_OF_BANDS, ZeroOne, zero_one_of_bands
 from saltus.bounds import area_contraction, enclose, leaves_over_a_period, on_side
 from saltus.flow import ContactRegularity, contact_regularity, find_recurrence
 from saltus.orbits import PeriodicOrbit
@@ -101,7 +101,7 @@ def regular_motion(system: System, state: np.ndarray, periods: int, tol: float) 
     It is if nothing excludes tori, if the 0-1 test of its coordinate sees order in all of the states at phase 0 and in every n-th
     of them, and if no attracting orbit is near, which it might approach slowly.
     """
-    if excludes_tori(system) is not None:
+    if periods < FEWEST_OF_BANDS or excludes_tori(system) is not None:
         return RegularMotion(None, None)
     ends = find_recurrence(system, state[None], periods, kept=periods, tol=tol)
     if not ends.unsettled[0]:

@@ -1,9 +1,8 @@
 from .chart.borders import Borders, with_borders
-from .chart.chart import bordered_chart, stability_chart
-from .chart.disagreements import disagreements
-from .chart.wrong_cells import wrong_cells
+from .chart.chart_checks import disagreements, wrong_cells
+from .chart.chart_study import bordered_chart, stability_chart
 from .diagram.chaos_search import chaotic_bands
-from .diagram.diagram import bifurcation_diagram, response_spectrum
+from .diagram.diagram_study import bifurcation_diagram, response_spectrum
 from .portrait import phase_portrait
 from .swept_parameter import frequency_sweep
 

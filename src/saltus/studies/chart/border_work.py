@@ -21,8 +21,7 @@ from saltus.orbits import SpecialPoint, continue_special, find_orbit, follow_sta
 from saltus.progress import Progress
 from saltus.provenance import check_provenance, identity
 from saltus.studies.chart.border_curves import curve_dataset
-from saltus.studies.chart.changes import Changes, ChartMotions
-from saltus.studies.chart.endings import Ways, ending_type, trace
+from saltus.studies.chart.changes import Changes, ChartMotions, Ways, ending_type, trace
 from saltus.studies.chart.follow import lost
 from saltus.studies.chart.motions import motion_type
 from saltus.systems import System

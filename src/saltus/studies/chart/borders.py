@@ -1,11 +1,14 @@
 """The exact borders of a stability chart: where its motions are born or lose their stability.
 
 If a cell has a motion that its neighbour lacks, simulation between the two cells shows what becomes of the motion. At the ends of
-motions on the longest borders the orbits are solved for, and their special points are followed as curves through the plane.
+motions on the longest borders, which are taken as points of one border where similar ones lie beside one another, the orbits are
+solved for, and their special points are followed as curves through the plane. Motions to which a neighbour's motion leads, but no
+initial state, are added to their cells.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,17 +19,137 @@ from saltus.checks import check_count
 from saltus.enumerations import flags
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import answered
-from saltus.studies.chart.added_motions import ADDED, has_motion, with_motions
 from saltus.studies.chart.border_curves import explained, passes_through
-from saltus.studies.chart.border_starts import border_starts, places
 from saltus.studies.chart.border_work import Workshop
-from saltus.studies.chart.changes import Changes, ChartMotions, changes_of, keys_of, read_chart
-from saltus.studies.chart.endings import ChangeOutcome, ending_type
-from saltus.studies.chart.request import ChartRequest
+from saltus.studies.chart.cells import beyond_limits, spread
+from saltus.studies.chart.changes import (
+    ENDS,
+    SEEN,
+    ChangeOutcome,
+    Changes,
+    ChartMotions,
+    changes_of,
+    ending_type,
+    is_symmetric,
+    keys_of,
+    read_chart,
+)
+from saltus.studies.chart.chart_request import ChartRequest
+from saltus.studies.chart.motions import ALIKE, KEPT, by_cell, distinct, has_alike, motion_type, outcomes, read_motions, table
 from saltus.systems import System, check_system
 
 if TYPE_CHECKING:
     import xarray
+
+
+@dataclass(frozen=True)
+class BorderStartSettings:
+    """Which borders are worth a curve."""
+
+    reach: float = 1.5  # Ends no farther than this from one another, in cells, may lie on one border.
+    fewest: int = 3  # The least number of ends on a border that is followed.
+    beside_rest: int = 10  # An end beside cells with rest alone counts this many times, as designers ask for the border of rest.
+    tries: int = 8  # The largest number of ends of a border from which its curve is tried to be begun.
+    beyond: float = 0.5  # Orbits are followed this far beyond the end of their motion, in cells.
+
+
+STARTS = BorderStartSettings()
+
+
+def border_starts(chart: ChartMotions, changes: Changes, endings: np.ndarray) -> list[list[dict[str, Any]]]:
+    """For each border, the most important ones first, the motions from whose ends its curve may be begun."""
+    rows = np.flatnonzero(np.isin(endings["outcome"], ENDS))
+    number, weight = _borders(chart, changes.only(rows), endings[rows])
+    size = np.bincount(number)
+    total = np.bincount(number, weights=weight)
+    chosen = sorted(np.flatnonzero(size >= STARTS.fewest), key=lambda border: -total[border])
+    return [list(_from(chart, changes, endings, rows[number == border])) for border in chosen]
+
+
+def places(changes: Changes, endings: np.ndarray) -> np.ndarray:
+    """Where motions end, row and column in cells, (n, 2): halfway between the last place where a motion has settled and the first
+    place where it is lost."""
+    share = 0.5 * (endings["settled"] + endings["next"]["share"])
+    return np.asarray(changes.source + share[:, None] * (changes.target - changes.source))
+
+
+def _borders(chart: ChartMotions, changes: Changes, endings: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The number of the border on which each end lies, and the weight of each end."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    last, spot = endings["last"], places(changes, endings)
+    if not len(last):
+        return np.zeros(0, dtype=int), np.zeros(0)
+    one, other = cKDTree(spot).query_pairs(STARTS.reach, output_type="ndarray").T
+    amplitude = last["amplitude"]
+    like = np.abs(amplitude[one] - amplitude[other]) <= ALIKE.family * np.maximum(amplitude[one], amplitude[other])
+    for values in (last["period"], is_symmetric(last), endings["outcome"]):
+        like &= values[one] == values[other]
+    graph = coo_array((np.ones(like.sum()), (one[like], other[like])), shape=(len(last), len(last)))
+    number = connected_components(graph, directed=False)[1]
+    return number, np.where(chart.monostable[tuple(changes.target.T)], STARTS.beside_rest, 1)
+
+
+def _from(chart: ChartMotions, changes: Changes, endings: np.ndarray, rows: np.ndarray) -> Iterator[dict[str, Any]]:
+    """The motions nearest to the middle of a border, as the starts of its curve."""
+    spot = places(changes, endings)[rows]
+    middle = np.median(spot, axis=0)
+    axes = (chart.horizontal, chart.vertical)
+    for i in rows[np.argsort(np.abs(spot - middle).sum(axis=1), kind="stable")[: STARTS.tries]]:
+        source, target, last = changes.source[i], changes.target[i], endings["last"][i]
+        along = 0 if source[0] == target[0] else 1
+        shares = (last["share"], max(endings["next"]["share"][i] + STARTS.beyond, 1.0))
+        here, beyond = ([_at(axes[k], source[1 - k] + share * (target - source)[1 - k]) for k in (0, 1)] for share in shares)
+        state = [float(value) for value in last["state"]]
+        yield {"state": state, "period": int(last["period"]), "place": here, "along": along, "goal": beyond[along]}
+
+
+def _at(axis: np.ndarray, place: float) -> float:
+    """The value of a parameter at a place in cells, within the chart."""
+    return float(np.interp(place, np.arange(len(axis)), axis))
+
+
+ADDED = "added_by_continuation"  # the attribute of the chart that counts them
+
+
+def with_motions(chart: xarray.Dataset, request: ChartRequest, cells: np.ndarray, found: np.ndarray) -> xarray.Dataset:
+    """The chart with the motions found, of `way_type`, in these cells, (n, 2) rows and columns, unless the cells have them
+    already, and with the motions to which these lead in neighbouring cells."""
+    made = chart.transpose("vertical", "horizontal", ...).copy(deep=True).load()  # its arrays are written to
+    shape, known = made["count"].shape, read_motions(made)
+    new = _as_motions(np.ravel_multi_index(tuple(cells.T), shape), found)
+    new = distinct(new[~has_alike(known, new["cell"], new, ALIKE.same)])
+    if not len(new):
+        return made
+    motions = by_cell(spread(request, new, distinct(np.concatenate([known, new]))))
+    columns = table(motions, made["count"].size, request.variables)
+    complete = made["count"].values <= KEPT  # other cells keep only some of their motions, so that none are added there
+    before = int(made["count"].sum())
+    for name, values in columns.items():
+        made[name].values[complete] = values.reshape(*shape, *values.shape[1:])[complete]
+    parameters = {path: values.reshape(shape) for path, values in request.parameters.items()}
+    for name, flag in beyond_limits(request.system, parameters, made["amplitude"].values).items():
+        made[name].values[:] = flag
+    made["outcome"].values[:] = outcomes(*(made[name].values for name in ("count", "unsettled", "verdict")))
+    made.attrs[ADDED] = int(chart.attrs[ADDED]) + int(made["count"].sum()) - before
+    return made
+
+
+def has_motion(chart: ChartMotions, cell: np.ndarray, amplitude: float) -> bool:
+    """Whether a cell, given by its row and column, has a motion of about this amplitude."""
+    there = chart.motions["amplitude"][(chart.place == cell).all(axis=1)]
+    return bool(np.abs(there - amplitude).min(initial=np.inf) < ALIKE.followed * amplitude)
+
+
+def _as_motions(cells: np.ndarray, found: np.ndarray) -> np.ndarray:
+    """Motions of `way_type` as motions of cells, of `motion_type`."""
+    motions = np.zeros(len(found), motion_type(found["state"].shape[1]))
+    motions["cell"] = cells
+    for name in SEEN:
+        motions[name] = found[name]
+    return by_cell(motions)
 
 
 @dataclass(frozen=True)

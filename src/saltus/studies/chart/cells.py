@@ -1,7 +1,7 @@
 """The cells of a stability chart: which stable motions there are under each pair of values of two parameters.
 
 In every cell motions are followed from states spread over a window, then from the motions of its neighbours, until these add
-nothing new.
+nothing new; motions that have not settled are judged.
 """
 
 from __future__ import annotations
@@ -13,15 +13,66 @@ from typing import Any
 
 import numpy as np
 
+from saltus.attractors import JudgementSettings, judge
 from saltus.flow import Ending, Recurrence, approached, find_recurrence
 from saltus.orbits import initial_states, rest_state, states_beside
-from saltus.studies.chart.cell_outcomes import outcomes
-from saltus.studies.chart.cell_verdicts import CellVerdicts
-from saltus.studies.chart.motions import ALIKE, SIDES, distinct, has_alike, is_alike, motion_type, motions_in, table
-from saltus.studies.chart.request import ChartRequest
+from saltus.studies.chart.chart_request import ChartRequest
+from saltus.studies.chart.motions import ALIKE, SIDES, distinct, has_alike, is_alike, motion_type, motions_in, outcomes, table
 from saltus.systems import System
 from saltus.theory import amplitude_limits
 from saltus.window import Window
+
+ASKED = 3  # motions of a cell that have not settled, from which the judgement starts at most
+COMPANIONS = 6  # motions that are followed for each cell that is judged
+
+
+class CellVerdicts:
+    """The judgement of the motions that have not settled, an entry for each cell in `cell`.
+
+    `later` holds the cells (k,) and states (k, d) of motions on which companions have settled after all.
+    """
+
+    def __init__(self, request: ChartRequest, motions: np.ndarray) -> None:
+        motions = motions[np.argsort(motions["cell"], kind="stable")]
+        self.cell, first = np.unique(motions["cell"], return_index=True)
+        last = np.append(first[1:], len(motions))
+        states = np.full((len(self.cell), ASKED, request.system.dimension), np.nan)
+        for i in range(ASKED):
+            there = first + i < last
+            states[there, i] = motions["state"][(first + i)[there]]
+        parameters = {path: values[self.cell] for path, values in request.parameters.items()}
+        found = judge(request.system, states, parameters, settings=judgement(request.periods, request.tol))
+        self.verdict, self.exponent, self.error = found.ending.copy(), found.exponent, found.error
+        longer = np.unique(found.settled.question[found.settled.period > request.max_period])
+        # A transient to an orbit of a longer period than the chart looks for leads to none of its motions.
+        self.verdict[longer[self.verdict[longer] == Ending.TRANSIENT]] = Ending.PERIODIC
+        self.later = self.cell[found.settled.question], found.settled.state
+
+        known = (found.period > 0) & (found.period <= request.max_period)
+        # Such starts end on motions that the cell has through `later`, or come to rest.
+        self.settles = (self.verdict == Ending.TRANSIENT) | ((self.verdict == Ending.PERIODIC) & known)
+
+
+def judgement(periods: int, tol: float) -> JudgementSettings:
+    """The settings by which motions of a chart are judged that have not settled within so many forcing periods.
+
+    As a chart has thousands of cells, each gets a few companions only, and transients are excluded with mean lives up to eight
+    times the periods.
+    """
+    return JudgementSettings(
+        companions=COMPANIONS,
+        first_periods=periods,
+        round_periods=3 * periods,
+        rounds=3,
+        exposure=4 * COMPANIONS * periods,
+        measured=COMPANIONS,
+        shortest_run=max(16, periods // 2),
+        longest_run=3 * periods,
+        regular_run=periods,
+        longest_period=64,
+        patience=10 * periods,
+        tol=tol,
+    )
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ import itertools
 from bisect import bisect_left, insort
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
@@ -15,25 +14,15 @@ from saltus.checks import check_count
 from saltus.flow import Ending
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import checked_by
-from saltus.studies.checks import check_diagram
-from saltus.studies.diagram.bands import Bands
+from saltus.studies.diagram.bands import BandOrigin, Bands
 from saltus.studies.diagram.diagram_work import DiagramWork
-from saltus.studies.diagram.effort import EFFORTS, read_effort
-from saltus.studies.diagram.searched_range import Begun, Question, SearchedRange
-from saltus.studies.diagram.searched_value import SearchedValue
+from saltus.studies.diagram.effort import EFFORTS, check_diagram, read_effort
+from saltus.studies.diagram.searched_range import Begun, Question, SearchedRange, SearchedValue
 from saltus.studies.diagram.simulated import SimulatedMotions, starts_at
 from saltus.systems import System
 from saltus.window import Box, check_window
 
 SLOWER = 0.8  # The share of the rest that is taken as still to be done after each round, as their number is not known before.
-
-
-class BandOrigin(NamedTuple):
-    """A special point of a branch, at which bands of chaos may begin."""
-
-    kind: str
-    value: float  # of the parameter
-    state: tuple[float, ...]  # of its orbit at phase 0
 
 
 def _check(

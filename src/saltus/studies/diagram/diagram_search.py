@@ -9,23 +9,45 @@ from typing import Any
 
 import numpy as np
 
+from saltus.attractors import share_interval
 from saltus.flow import motions_from, stroboscopic
 from saltus.orbits import PeriodicOrbit, keeps_symmetry, orbits_near_returns, solved_near, within_window
 from saltus.progress import Progress, part_of, silent
-from saltus.studies.diagram.attractors_found import LONG, AttractorsFound, Place
-from saltus.studies.diagram.band_edges import band_origins
-from saltus.studies.diagram.bands import Bands
-from saltus.studies.diagram.branch_set import BranchSet
+from saltus.studies.diagram.bands import Bands, band_origins
+from saltus.studies.diagram.branch_set import BranchSet, PlacedBranch, placed, stable_motions
 from saltus.studies.diagram.chaos_search import BandSearch
 from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.effort import EffortSettings
-from saltus.studies.diagram.missed_share import MissedShare
-from saltus.studies.diagram.placement import PlacedBranch, placed, stable_motions
 from saltus.studies.diagram.side_by_side import side_by_side
+from saltus.studies.diagram.simulated import LONG, AttractorsFound, Place, SimulatedMotions, starts_at
 from saltus.studies.diagram.simulated import SETTINGS as SIMULATION
-from saltus.studies.diagram.simulated import SimulatedMotions, starts_at
 from saltus.systems import System
 from saltus.window import Window
+
+
+@dataclass(frozen=True)
+class MissedShare:
+    """The share of states that end on something which is not in the diagram, estimated by a sample of them."""
+
+    missed: int = 0  # motions of the sample that end on such a thing
+    sample: int = 0
+    samples: int = 0  # how many samples were tried; this is the last one
+    ended: int = 0  # motions of the sample that a limit of the model ends, so that it is not known where they would have gone
+
+    @property
+    def share(self) -> float:
+        """The estimate; nan without a sample."""
+        return self.missed / self.sample if self.sample else np.nan
+
+    @property
+    def ended_share(self) -> float:
+        """The share of the sample that a limit of the model ends; nan without a sample."""
+        return self.ended / self.sample if self.sample else np.nan
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The 95 % interval of a binomial share (Wilson's)."""
+        return share_interval(self.missed, self.sample)
 
 
 @dataclass(frozen=True)

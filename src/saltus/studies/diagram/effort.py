@@ -1,4 +1,4 @@
-"""How much is tried for a diagram: one record of numbers for each level of effort."""
+"""How much is tried for a diagram: one record of numbers for each level of effort, and the checks of its arguments."""
 
 from __future__ import annotations
 
@@ -6,9 +6,74 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
+from saltus.attractors import JUDGEMENT, JudgementSettings
+from saltus.checks import check_along, check_bounds, check_count, check_path, check_starts
 from saltus.errors import ParameterError, near
-from saltus.studies.diagram.chaos_settings import SETTINGS as CHAOS
-from saltus.studies.diagram.chaos_settings import ChaosSettings
+from saltus.systems import System, check_system
+
+
+def check_diagram(system: System, path: str, bounds: tuple[float, float], **counts: int) -> tuple[float, float]:
+    """The bounds as two numbers; raises a ParameterError for arguments with which the study would fail later."""
+    check_system(system, "a diagram", several_contacts=True)
+    if system.load.frequency is None:
+        raise ParameterError(
+            "a load without a frequency has no periodic orbits to draw; give the Load a frequency", "load.frequency"
+        )
+    low, high = check_bounds(bounds)
+    check_path(system, path)
+    check_along(system, path, (low, high), "bounds")
+    for name, count in counts.items():
+        check_count(name, count, 1 if name in ("max_period", "starts") else 0)
+        if name == "starts":
+            check_starts(count)
+    return low, high
+
+
+@dataclass(frozen=True)
+class ChaosSettings:
+    """How chaos is looked for along a parameter."""
+
+    settling: int = 300  # Forcing periods that a motion is given to come to rest or to repeat itself.
+    # Intervals in which something changes, or with chaos at an end, are halved down to this share of the range, ...
+    step: float = 1e-3
+    # ... or to this one where motions have longer periods than `long_period`: cascades and narrow bands are near.
+    fine_step: float = 3e-4
+    long_period: int = 6
+    undecided: float = 1.0  # Factor by which both are larger between two values that are undecided, as where motions are on tori.
+    edge: float = 1e-4  # The bracket of an edge is halved down to this share of the range.
+    seeds: int = 2  # States of the chaos at each end of an interval from which motions are begun within it.
+    neighbours: int = 4  # Settled motions at each end of an interval from which motions are begun within it.
+    # With several contacts, impacts slower than this belong to an accumulation. How many of them were followed is no property of
+    # the motion, whose number of impacts is then taken as 0.
+    dying: float = 1e-5
+    states: int = 8  # Last states of each unsettled motion that are given to the judgement.
+    # Distances from a special point, as shares of the range, at which motions are begun from its orbit: narrow bands begin there.
+    beside: tuple[float, ...] = (-4e-4, -1.5e-4, 1.5e-4, 4e-4)
+    spacing: float = 0.0  # Of special points that are nearer to one another than this share of the range, only one is taken.
+    # Special points are the same if their states differ by less than this, and their parameters by less than this share of the
+    # range.
+    same: float = 1e-7
+    # Judgements of rising care, which exclude transients of mean lives below 660, 6600 and 33 000 forcing periods. The first one
+    # is made at all values, the others where `BandSearch.confirm` finds the chaos doubtful. They count the time without settling
+    # of the judgement before; if none settles, the second one then takes one round, and the third one three.
+    judgements: tuple[JudgementSettings, ...] = (
+        replace(JUDGEMENT, companions=8, exposure=2000, round_periods=500, rounds=2),
+        replace(JUDGEMENT, companions=12, exposure=20_000, round_periods=1500),
+        JUDGEMENT,
+    )
+    # The values of a band within this share of the range are judged together, by the sum of the forcing periods in which none of
+    # their motions has settled.
+    every: float = 0.02
+    # Where chaos turns out to be a transient, this many values with chaos on each side are judged next with as much care; if
+    # these fail too, twice as many, and so on.
+    near: int = 1
+    # Chaos next to transients must exclude mean lives this many times as long as theirs. Towards a crisis, lives grow like a
+    # power between -1/2 and about -3/2 of the distance, so that the edge is wrong by no more than the width of its bracket.
+    longer: float = 3.0
+    confirmations: int = 20  # The largest number of rounds in which edges are located and confirmed.
+
+
+CHAOS = ChaosSettings()
 
 
 class Effort(StrEnum):

@@ -24,8 +24,7 @@ from saltus.enumerations import flags
 from saltus.errors import ParameterError, shown
 from saltus.flow import Ending, state_names
 from saltus.provenance import check_provenance, identity, provenance
-from saltus.studies.chart.cell_outcomes import CellOutcome
-from saltus.studies.chart.motions import KEPT
+from saltus.studies.chart.motions import KEPT, CellOutcome
 from saltus.systems import System, check_system
 from saltus.theory import amplitude_limits
 from saltus.window import check_window

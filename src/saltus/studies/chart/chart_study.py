@@ -13,8 +13,8 @@ from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import checked_by
 from saltus.studies.chart.borders import with_borders
 from saltus.studies.chart.changes import read_chart
-from saltus.studies.chart.disagreements import disagreements
-from saltus.studies.chart.request import ChartRequest
+from saltus.studies.chart.chart_checks import disagreements
+from saltus.studies.chart.chart_request import ChartRequest
 from saltus.systems import System, check_system
 from saltus.theory import quasi_static_border
 from saltus.window import Box
