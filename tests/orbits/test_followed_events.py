@@ -247,7 +247,7 @@ def test_a_state_beside_a_section_at_which_a_layer_is_held_has_events(bouncing: 
             beside = unknowns.copy()
             beside[place] += step
             equations = problem.evaluate(beside, problem.values, with_extremes=True)
-            assert equations is None or equations.followed is not None
+            assert equations is None or equations.events is not None
 
 
 @pytest.fixture(scope="module")

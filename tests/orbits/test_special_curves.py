@@ -15,7 +15,6 @@ from saltus.orbits.branches.codimension import normal_form
 from saltus.orbits.branches.orbit_curve import OrbitCurve
 from saltus.orbits.branches.special_curve import SpecialCurvePoint
 from saltus.orbits.equations.one_contact import OneContactEquations
-from saltus.orbits.symmetry import over_full_period
 from saltus.theory.impact_oscillator import wall_orbits
 
 FREQUENCY, AMPLITUDE, VERTICAL, FORCE = "load.frequency", "load.horizontal.amplitude", "load.vertical", "load.force.amplitude"
@@ -177,7 +176,7 @@ def test_folds_and_symmetry_breakings_of_six_crossings_end_at_one_point_of_the_g
 def shift_of_the_broken_family(point: SpecialCurvePoint, distance: float) -> float:
     """How far in the first parameter the unsymmetric orbit lies that differs by a distance from a symmetric one at its BPC."""
     direction = point.condition_value.right / np.linalg.norm(point.condition_value.right)
-    problem, unknowns = over_full_period(point.orbit.equations, point.solution.unknowns)
+    problem, unknowns = point.orbit.equations.over_full_period(point.solution.unknowns)
     direction = np.concatenate([direction, -direction])
     curve = OrbitCurve(OneContactEquations(point.orbit.system, problem.signature, (FREQUENCY,)), (1.0,))
     guess = np.append(unknowns + distance * direction, point.solution.values[0])
@@ -215,10 +214,10 @@ def test_the_normal_form_does_not_depend_on_the_step_where_phases_respond_strong
 def test_there_is_no_normal_form_where_the_equations_are_singular() -> None:
     """Exactly singular, as they are where a curve comes to loads of zero: no codimension-two point is looked for there."""
     point = low_frequency("BPC").points[3]
-    equations = point.equations
-    singular = replace(equations, here=np.zeros_like(equations.here), there=np.zeros_like(equations.there))
+    evaluation = point.evaluation
+    singular = replace(evaluation, here=np.zeros_like(evaluation.here), there=np.zeros_like(evaluation.there))
     assert math.isfinite(normal_form(point))
-    assert math.isnan(normal_form(replace(point, equations=singular)))
+    assert math.isnan(normal_form(replace(point, evaluation=singular)))
 
 
 @pytest.mark.thorough

@@ -54,7 +54,7 @@ def newton(
     linear: Linear[E],
     guess: np.ndarray,
     iterations: int,
-    rounded: float = 0.0,
+    residual_floor: float = 0.0,
     near: bool = False,
 ) -> Corrected[E] | None:
     """The zero of a system near a guess, or None where Newton's method does not converge.
@@ -70,7 +70,7 @@ def newton(
         Where to begin.
     iterations
         The most steps.
-    rounded
+    residual_floor
         The largest residual that rounding may leave if derivatives are large. It is accepted if a further step would move the
         unknowns by no more than `converged`.
     near
@@ -90,7 +90,7 @@ def newton(
         step = _step(*linear(found, place)) if error < NEWTON.diverged else None
         if step is None:
             return None
-        if slow and error <= rounded and np.abs(step).max() <= NEWTON.converged * scale:
+        if slow and error <= residual_floor and np.abs(step).max() <= NEWTON.converged * scale:
             looked = found if thorough else evaluate(place, True)
             return None if looked is None else Corrected(place, looked, iteration)
         before, place = error, place + step

@@ -20,8 +20,8 @@ class EquationCurve(Curve[P]):
     iterations = 7  # the most iterations of Newton's method in a hyperplane: if it needs more, the step is too long
     iterations_at = 12  # the most iterations with one component fixed, where the guess may be farther away
     # Share of a step: a corrector that leads farther than this from where the step was predicted is given up.
-    stray: float = math.inf
-    rounded: float = 0.0  # The largest residual that rounding may leave, where derivatives are large.
+    corrector_radius: float = math.inf
+    residual_floor: float = 0.0  # The largest residual that rounding may leave, where derivatives are large.
 
     @abstractmethod
     def evaluate(self, place: np.ndarray, thorough: bool) -> Evaluation | None:
@@ -51,7 +51,7 @@ class EquationCurve(Curve[P]):
             return bordered(found.derivatives(), normal), -bordered(found.residual, normal @ (place - guess))
 
         evaluate = self.evaluate if reach == math.inf else within_reach
-        found = newton(evaluate, linear, guess, self.iterations, self.rounded, near)
+        found = newton(evaluate, linear, guess, self.iterations, self.residual_floor, near)
         return None if found is None else self.with_tangent(found, direction)
 
     def solve_at(self, guess: np.ndarray, direction: np.ndarray, index: int = -1) -> P | None:
@@ -68,7 +68,7 @@ class EquationCurve(Curve[P]):
         def linear(found: Evaluation, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             return found.derivatives()[:, free], -found.residual
 
-        found = newton(evaluate, linear, guess[free], self.iterations_at, self.rounded)
+        found = newton(evaluate, linear, guess[free], self.iterations_at, self.residual_floor)
         if found is None:
             return None
         return self.with_tangent(Corrected(filled(found.place), found.evaluation, found.iterations), direction)
@@ -100,7 +100,7 @@ class EquationCurve(Curve[P]):
     def advance(self, before: P | None, point: P, step: float) -> P | None:
         """The point a step further; None if Newton's method does not converge, or converges too far from the predicted place."""
         guess = predicted(before, point, step)
-        ahead = self.solve_within(guess, point.tangent, self.stray * step)
+        ahead = self.solve_within(guess, point.tangent, self.corrector_radius * step)
         straight = before is None or not before.curve.joins(point.curve)
         off = STEPS.off_tangent if straight else STEPS.off
         return None if ahead is None or self.norm(ahead.place - guess) >= off * step else ahead

@@ -6,8 +6,7 @@ from .branches.special_curve import SpecialCurve
 from .branches.special_curve_continuation import continue_special
 from .branches.special_point import OrbitEnd, SpecialKind, SpecialPoint
 from .branches.switching import Cascade, doubling_cascade, switch_branch
-from .equations.contacts import equations_of
-from .equations.newton import solve
+from .equations.kinds import equations_of
 from .equations.one_contact import OneContactEquations
 from .equations.resting import RestingOrbit
 from .finding.from_motion import find_orbit, orbit_from
@@ -25,7 +24,7 @@ from .finding.starts import (
     within_window,
 )
 from .free_orbits import FreeOrbit, FreeOutcome, backbone, free_orbit
-from .orbit import PeriodicOrbit
+from .orbit import PeriodicOrbit, solve
 from .orbits_as_bytes import as_bytes, from_bytes
 from .signature import Signature
 from .symmetry import is_symmetric, keeps_symmetry

@@ -10,14 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.checks import LIMITS, check_count
+from saltus.continuation import newton
 from saltus.errors import MotionError
 from saltus.flow import Motion, SegmentColumn, Validity, simulate
 from saltus.notebook import html_table
-from saltus.orbits.equations.contacts import ContactsEquations
-from saltus.orbits.equations.newton import NEWTON_ITERATIONS, Solution, solve
-from saltus.orbits.equations.one_contact import OneContactEquations
-from saltus.orbits.equations.whole_motion import WholeMotionEquations
-from saltus.orbits.finding.starts import start_at
+from saltus.orbits.equations.contract import OrbitEquations, OrbitEvaluation, Solution
 from saltus.orbits.signature import Signature
 from saltus.orbits.tolerances import TOLERANCES
 from saltus.result import Result
@@ -25,6 +22,8 @@ from saltus.systems import System
 
 if TYPE_CHECKING:
     import xarray
+
+NEWTON_ITERATIONS = 12  # enough from a guess near the orbit; a motion that has not quite settled needs more
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,12 +47,12 @@ class PeriodicOrbit(Result):
     True
     """
 
-    equations: OneContactEquations
+    equations: OrbitEquations
     solution: Solution
 
     @classmethod
     def near(
-        cls, equations: OneContactEquations, unknowns: np.ndarray, values: np.ndarray, iterations: int = NEWTON_ITERATIONS
+        cls, equations: OrbitEquations, unknowns: np.ndarray, values: np.ndarray, iterations: int = NEWTON_ITERATIONS
     ) -> PeriodicOrbit | None:
         """The orbit near a guess at fixed parameters, or None where Newton's method does not converge.
 
@@ -72,7 +71,7 @@ class PeriodicOrbit(Result):
         return None if found is None else PeriodicOrbit(equations, found)
 
     @classmethod
-    def known(cls, equations: OneContactEquations, unknowns: np.ndarray, values: np.ndarray) -> PeriodicOrbit | None:
+    def known(cls, equations: OrbitEquations, unknowns: np.ndarray, values: np.ndarray) -> PeriodicOrbit | None:
         """The orbit whose unknowns are known: nothing is solved. None where its motion cannot be followed.
 
         Parameters
@@ -119,7 +118,7 @@ class PeriodicOrbit(Result):
 
     @cached_property
     def _phases(self) -> np.ndarray:
-        phases, _ = self.equations.impacts(self.solution.unknowns, self.solution.evaluation)
+        phases, _ = self.equations.impacts(self.solution)
         return np.concatenate([phases, phases + self.equations.closing]) if self.symmetric else phases
 
     @cached_property
@@ -129,13 +128,23 @@ class PeriodicOrbit(Result):
         return times
 
     @property
+    def impact_count(self) -> int:
+        """The number of impacts in one of its periods; of an accumulation, those that are resolved."""
+        return int(self._phases.size)
+
+    @property
+    def counted_impacts(self) -> int:
+        """The number of impacts in one of its periods, without those of accumulations, whose number depends on rounding."""
+        return self.equations.counted_impacts(self.solution) * (2 if self.symmetric else 1)
+
+    @property
     def _shift(self) -> float:
         return math.floor(self._phases[0] / (2.0 * math.pi)) if self._phases.size else 0.0
 
     @property
     def speeds(self) -> np.ndarray:
         """The speeds at which the gap closes, just before the impacts, (n,)."""
-        _, speeds = self.equations.impacts(self.solution.unknowns, self.solution.evaluation)
+        _, speeds = self.equations.impacts(self.solution)
         return np.tile(speeds, 2) if self.symmetric else speeds
 
     @property
@@ -143,6 +152,21 @@ class PeriodicOrbit(Result):
         """The sides before the impacts, (n,)."""
         sides = np.array(self.signature.sides, dtype=int)
         return np.concatenate([sides, -sides]) if self.symmetric else sides
+
+    @property
+    def releases(self) -> np.ndarray:
+        """The times at which it leaves rest at a contact, (n,)."""
+        return np.empty(0)
+
+    @property
+    def rests(self) -> np.ndarray:
+        """The times at which it comes to rest at a contact, each after the release of the same index, (n,)."""
+        return np.empty(0)
+
+    @property
+    def rest_share(self) -> float:
+        """The share of its period for which it rests."""
+        return 0.0
 
     @property
     def residual(self) -> float:
@@ -193,7 +217,7 @@ class PeriodicOrbit(Result):
     def pressing(self) -> float:
         """With several contacts the least of the reactions of closed ones and the times between events; inf with one contact. If
         it is negative this is no real motion."""
-        return self.equations.pressing(self.solution.unknowns, self.solution.evaluation)
+        return self.equations.pressing(self.solution)
 
     @property
     def admissible(self) -> bool:
@@ -224,7 +248,7 @@ class PeriodicOrbit(Result):
 
         False where the contact is no singularity (`ContactRegularity.CONTINUOUS`): multipliers then keep their meaning.
         """
-        speed = self.equations.touching_speed(self.solution.unknowns, self.solution.evaluation)
+        speed = self.equations.touching_speed(self.solution)
         return not self.equations.passes_contact and min(abs(self.clearance), abs(speed)) < TOLERANCES.touch
 
     @property
@@ -234,19 +258,8 @@ class PeriodicOrbit(Result):
 
     def start(self) -> dict[str, Any]:
         """The arguments of `simulate` that start a motion on the orbit: just after its first impact or, without impacts, at phase
-        0.
-
-        With several contacts, or where the orbit is followed through its events, it starts between two events.
-        """
-        if isinstance(self.equations, (ContactsEquations, WholeMotionEquations)):
-            state, time = self.equations.within(self.solution.unknowns, self.solution.evaluation, self.solution.values)
-            return {**start_at(self.system, state), "time": time}
-        if not self.signature.sides:
-            return start_at(self.system, self.solution.unknowns)
-        model, load, impact = self.system.one_contact, self.system.load, self.system.impact
-        side, time = int(self.sides[0]), float(self.impact_times[0])
-        _, after = model.reset(time, -model.inward(side) * float(self.speeds[0]), side, load, impact)
-        return {model.coordinates[0]: float(model.contact), "velocity": float(after), "time": time}
+        0; with several contacts or with rests, between two events."""
+        return self.equations.start(self.solution)
 
     def motion(self, periods: float | None = None, tol: float = 1e-13) -> Motion:
         """The exact motion on the orbit, from `start`.
@@ -296,12 +309,10 @@ class PeriodicOrbit(Result):
     @cached_property
     def state(self) -> tuple[Any, Any]:
         """Coordinate and velocity at phase 0 of the load, the stroboscopic section."""
-        signature = self.signature
-        if not (signature.sides or signature.events or signature.closed or signature.section):
-            n = self.equations.own
-            return (float(self.solution.unknowns[0]), float(self.solution.unknowns[1])) if n == 1 else (
-                self.solution.unknowns[:n], self.solution.unknowns[n:])  # fmt: skip
         start = self.start()
+        if not start.get("time", 0.0):
+            position = [start[name] for name in self.system.model.coordinates]
+            return (*position, start["velocity"]) if len(position) == 1 else (np.array(position), np.array(start["velocity"]))  # type: ignore[return-value]
         period = 2.0 * math.pi / self.frequency
         ahead = max(1, math.ceil(start["time"] / period)) * period - start["time"]
         motion = simulate(self.system, **start, duration=ahead, tol=1e-13, dense=False)
@@ -338,14 +349,29 @@ class PeriodicOrbit(Result):
 
     def _repr_html_(self) -> str:
         names = ("period", "duration", "frequency", "amplitude", "symmetric", "stable", "residual")
-        facts = {name: getattr(self, name) for name in names} | {"impacts": self.signature.impact_count}
+        facts = {name: getattr(self, name) for name in names} | {"impacts": self.impact_count}
         multipliers = ", ".join(f"{value:.6g}" for value in self.multipliers)
         return html_table(f"Orbit of {type(self.system.model).__name__}", facts | {"multipliers": multipliers})
 
     def __repr__(self) -> str:
         kind = "symmetric " if self.symmetric else ""
         return (
-            f"PeriodicOrbit({kind}period {self.period}, {self.signature.impact_count} impacts, amplitude={self.amplitude:.9g}, "
+            f"PeriodicOrbit({kind}period {self.period}, {self.impact_count} impacts, amplitude={self.amplitude:.9g}, "
             f"{'stable' if self.stable else 'unstable'}, largest multiplier {self.multipliers[0]:.6g}, "
             f"residual={self.residual:.1g})"
         )
+
+
+def solve(
+    equations: OrbitEquations, unknowns: np.ndarray, values: np.ndarray, iterations: int = NEWTON_ITERATIONS
+) -> Solution | None:
+    """The orbit near a first guess at fixed parameters, or None where Newton's method does not converge."""
+
+    def evaluate(place: np.ndarray, thorough: bool) -> OrbitEvaluation | None:
+        return equations.evaluate(place, values, with_extremes=thorough)
+
+    def linear(found: OrbitEvaluation, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return found.jacobian(), -found.residual
+
+    found = newton(evaluate, linear, unknowns, iterations)
+    return None if found is None else Solution(found.place, values, found.evaluation, found.iterations)

@@ -17,8 +17,7 @@ import numpy as np
 
 from saltus.errors import ParameterError
 from saltus.orbits.branches.orbit_curve import OrbitCurve, OrbitPoint
-from saltus.orbits.equations.newton import Solution
-from saltus.orbits.equations.one_contact import OneContactEquations
+from saltus.orbits.equations.contract import OrbitEquations, Solution
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.systems import System
 
@@ -52,7 +51,7 @@ class _OrbitWriter(pickle.Pickler):
         """The function and the arguments that make an object again; properties that it has computed and cached are not kept."""
         if isinstance(found, System):
             return _system, (found.to_json(),)
-        if isinstance(found, OneContactEquations):
+        if isinstance(found, OrbitEquations):
             return type(found), (found.system, found.signature, found.paths, found.tol)
         if type(found) is OrbitPoint:
             return _point, (found.curve, found.place, found.tangent, found.iterations)
@@ -73,7 +72,7 @@ class _OrbitReader(pickle.Unpickler):
         if module.split(".")[0] == "numpy" and name in ARRAYS:
             return super().find_class(module, name)
         found = super().find_class(module, name) if module.startswith("saltus.") else None
-        if isinstance(found, type) and (is_dataclass(found) or issubclass(found, (Enum, OneContactEquations))):
+        if isinstance(found, type) and (is_dataclass(found) or issubclass(found, (Enum, OrbitEquations))):
             return found
         raise pickle.UnpicklingError(f"{module}.{name}")
 
@@ -89,7 +88,7 @@ def _point(curve: OrbitCurve, place: np.ndarray, tangent: np.ndarray, iterations
     return OrbitPoint(curve, place, tangent, iterations, evaluation)
 
 
-def _orbit(equations: OneContactEquations, unknowns: np.ndarray, values: np.ndarray, iterations: int) -> PeriodicOrbit:
+def _orbit(equations: OrbitEquations, unknowns: np.ndarray, values: np.ndarray, iterations: int) -> PeriodicOrbit:
     evaluation = equations.evaluate(unknowns, values, with_extremes=True)
     if evaluation is None:
         raise ParameterError(DAMAGED)

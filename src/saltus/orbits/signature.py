@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from saltus.flow import EventCode
 
@@ -82,3 +82,31 @@ class Signature:
             return (self.side,)
         closing = -self.sides[0] if self.symmetric else self.sides[0]
         return (*self.sides[1:], closing)
+
+    def halved(self) -> Signature:
+        """The signature, over half the period, of an orbit of this one that is its own image: symmetric if the period is odd,
+        else of half the period."""
+        odd = bool(self.period % 2)
+        sides, events = self.sides[: len(self.sides) // 2], self.events[: len(self.events) // 2]
+        return replace(self, sides=sides, events=events, period=self.period if odd else self.period // 2, symmetric=odd)
+
+    def over_full_period(self, images: Sequence[int]) -> Signature:
+        """That of a symmetric orbit over its full period; `images` has the number of the image of each contact."""
+        sides = (*self.sides, *(-side for side in self.sides))
+        events = (*self.events, *(event.image(images) for event in self.events))
+        return replace(self, sides=sides, events=events, symmetric=False)
+
+    def repeated(self) -> Signature:
+        """That of an orbit which goes round twice."""
+        return replace(self, sides=2 * self.sides, events=2 * self.events, period=2 * self.period, symmetric=False)
+
+    def part(self, periods: int) -> Signature | None:
+        """That of an orbit of a shorter period which is gone round several times; None if it cannot be."""
+        changes = self.sides or self.events
+        n = len(changes)
+        if self.period % periods or (n * periods) % self.period:
+            return None
+        part = n * periods // self.period
+        if changes and (part == 0 or changes[:part] != changes[part : 2 * part]):
+            return None
+        return replace(self, sides=self.sides[:part], events=self.events[:part], period=periods, symmetric=False)

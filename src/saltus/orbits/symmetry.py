@@ -1,18 +1,10 @@
-"""The mirror symmetry of a forced system, and orbits that are their own mirror images half a period later."""
+"""The mirror symmetry of a forced system: the mirror image of every motion, half a forcing period later, is a motion too."""
 
 from __future__ import annotations
 
 import cmath
-from dataclasses import replace
 
-import numpy as np
-
-from saltus.continuation import Corrected
 from saltus.errors import ParameterError
-from saltus.orbits.branches.orbit_curve import OrbitPoint
-from saltus.orbits.equations.contacts import ContactsEquations
-from saltus.orbits.equations.one_contact import OneContactEquations
-from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.tolerances import TOLERANCES
 from saltus.public_functions import answered
 from saltus.systems import Constant, Harmonic, Load, Signal, System, check_system
@@ -80,68 +72,3 @@ def keeps_symmetry(system: System, path: str) -> bool:
         if is_symmetric(beside):
             return True
     return False
-
-
-def half(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
-    """An orbit that is its own mirror image, as a solution of the equations over half its period; None for other orbits."""
-    equations, signature, unknowns = orbit.equations, orbit.signature, orbit.solution.unknowns
-    n, odd = divmod(len(signature.sides) + len(signature.events), 2)
-    if signature.symmetric or signature.period % 2 == 0 or odd:
-        return None
-    if signature.sides:
-        first, second = unknowns.reshape(2, n, 2)
-        if n % 2 == 0 or np.abs(second - first - [np.pi * signature.period, 0.0]).max() > TOLERANCES.halves:
-            return None
-    elif signature.events:
-        assert isinstance(equations, ContactsEquations)
-        both = equations.halves(unknowns, orbit.solution.evaluation)
-        if both is None or np.abs(both[1] - both[0]).max() > TOLERANCES.halves:
-            return None
-    elif signature.closed or (equations.system.model.has_one_contact and not equations.passes_contact):
-        return None
-    short = equations.with_signature(replace(signature, sides=signature.sides[:n], events=signature.events[:n], symmetric=True))
-    found = PeriodicOrbit.near(short, unknowns[: short.size], orbit.solution.values)
-    moved = found is not None and not n and np.abs(found.solution.unknowns - unknowns).max() >= TOLERANCES.halves
-    return None if moved else found
-
-
-def over_full_period(equations: OneContactEquations, unknowns: np.ndarray) -> tuple[OneContactEquations, np.ndarray]:
-    """The problem of the full period of a symmetric orbit, and the orbit's unknowns in it."""
-    signature = equations.signature
-    sides = (*signature.sides, *(-s for s in signature.sides))
-    events = (*signature.events, *(event.image(equations.images) for event in signature.events))
-    other = equations.with_signature(replace(signature, sides=sides, events=events, symmetric=False))
-    return other, equations.repeated(unknowns) if sides or events else unknowns
-
-
-def full_point(point: OrbitPoint) -> OrbitPoint:
-    """A point with a symmetric orbit, on the curve of the equations over its full period."""
-    n = point.orbit.equations.size
-    other, unknowns = over_full_period(point.orbit.equations, point.place[:n])
-    _, ahead = over_full_period(point.orbit.equations, point.place[:n] + point.tangent[:n])
-    curve = point.curve.with_equations(other)
-    found = curve.known(unknowns, point.parameters)
-    assert found is not None, "a symmetric orbit can be followed over its full period"
-    tangent = np.append(ahead - unknowns, point.tangent[n:])
-    there: OrbitPoint = curve.point_at(found, tangent / curve.norm(tangent))
-    return there
-
-
-def half_point(point: OrbitPoint) -> OrbitPoint:
-    """A point on the curve of the equations over half its period, if its orbit and the system are symmetric; else the point."""
-    orbit = half(point.orbit) if point.curve.symmetric else None
-    if orbit is None:
-        return point
-    curve, solution = point.curve.with_equations(orbit.equations), orbit.solution
-    found = Corrected(np.append(solution.unknowns, solution.values), solution.evaluation, point.iterations)
-    tangent = np.append(point.tangent[: orbit.equations.size], point.tangent[point.orbit.equations.size :])
-    there: OrbitPoint = curve.point_at(found, tangent / curve.norm(tangent))
-    return there
-
-
-def full_period(orbit: PeriodicOrbit) -> PeriodicOrbit:
-    """A symmetric orbit as a solution of the equations over its full period."""
-    # Newton's method is not used: where the symmetry breaks these equations are singular.
-    found = PeriodicOrbit.known(*over_full_period(orbit.equations, orbit.solution.unknowns), orbit.solution.values)
-    assert found is not None, "a symmetric orbit can be followed over its full period"
-    return found

@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
+from typing import Any
 
 import numpy as np
 
@@ -22,12 +23,12 @@ from saltus.orbits.branches.images import is_image, nearest, parent_of
 from saltus.orbits.branches.orbit_curve import OrbitPoint
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint
 from saltus.orbits.equations.event_sequence import SETTINGS as EVENTS
-from saltus.orbits.equations.event_sequence import FollowedEvents, OrbitEvent
-from saltus.orbits.equations.whole_motion import WholeMotionEquations, WholeMotionEvaluation
-from saltus.orbits.finding.contact_signature import section_of
+from saltus.orbits.equations.event_sequence import EventSequence, OrbitEvent
+from saltus.orbits.equations.read_events import section_of
 from saltus.orbits.orbit import PeriodicOrbit
+from saltus.orbits.tolerances import TOLERANCES
 
-EventSequence = tuple[OrbitEvent, ...]
+Events = tuple[OrbitEvent, ...]
 TINY = float(np.finfo(float).tiny)  # replaces a distance of 0 before a change of events, to keep the test function negative there
 
 
@@ -71,12 +72,16 @@ class OtherSideSettings:
 SETTINGS = OtherSideSettings()
 
 
-def events_at(point: OrbitPoint) -> FollowedEvents:
+def events_at(point: OrbitPoint) -> EventSequence:
     """The events of a point's orbit."""
-    evaluation = point.evaluation
-    assert isinstance(evaluation, WholeMotionEvaluation)
-    assert evaluation.followed is not None
-    return evaluation.followed
+    return events_of(point.evaluation)
+
+
+def events_of(evaluation: Any) -> EventSequence:
+    """The events in equations that were evaluated with extremes."""
+    found: EventSequence | None = evaluation.events
+    assert found is not None
+    return found
 
 
 def same_events(reference: OrbitPoint) -> TestFunction:
@@ -108,9 +113,9 @@ def change_at(zero: Zero, reference: OrbitPoint) -> Cut | End:
     if other is None:
         kind: SpecialKind | None = SpecialKind.SW
     elif _is_discontinuous(other):
-        kind = first_change(events_at(here), events_of_evaluation(other))
+        kind = first_change(events_at(here), events_of(other))
     else:
-        kind = kind_between(before, events_of_evaluation(other))
+        kind = kind_between(before, events_of(other))
     return Cut(zero.point, None if kind is None else SpecialPoint(kind, zero.point, zero.evidence))
 
 
@@ -137,7 +142,7 @@ def stalled_at(point: OrbitPoint, step: float, points: Sequence[OrbitPoint] = ()
     if beside is None:
         return None
     test, width = same_events(point), step * np.abs(np.array(point.curve.scales))
-    there, value = -max(events_of_evaluation(beside).distance, TINY), test.value(point)
+    there, value = -max(events_of(beside).distance, TINY), test.value(point)
     known = [(value, point.parameters)]
     for before in reversed(points):
         if before.curve.joins(point.curve) and test.value(before) > SETTINGS.fall * max(known[-1][0], TINY):
@@ -170,7 +175,7 @@ def beyond(cut: Cut, points: Sequence[OrbitPoint]) -> OrbitPoint | End:
     return other_events(cut.point, sequence, points)
 
 
-def other_events(point: OrbitPoint, sequence: EventSequence | None, points: Sequence[OrbitPoint] = ()) -> OrbitPoint | End:
+def other_events(point: OrbitPoint, sequence: Events | None, points: Sequence[OrbitPoint] = ()) -> OrbitPoint | End:
     """An orbit beside a point that has other events than `sequence`, with the direction away from the point; or why there is
     none.
 
@@ -216,9 +221,9 @@ def _just_beyond(point: OrbitPoint, place: np.ndarray, way: np.ndarray, probe: f
         if len(known) > 1 and not abs(at - known[-1][0]) > SETTINGS.inside * probe**2:
             return np.asarray(place + (at + SETTINGS.inside * probe**2) * axis)
         evaluation = point.curve.evaluate(place + at * axis, thorough=True)
-        if evaluation is None or events_of_evaluation(evaluation).sequence != events_at(point).sequence:
+        if evaluation is None or events_of(evaluation).sequence != events_at(point).sequence:
             return np.asarray(place + (at + SETTINGS.inside * probe**2) * axis) if len(known) > 1 else None
-        known.append((at, events_of_evaluation(evaluation).distance))
+        known.append((at, events_of(evaluation).distance))
     return None
 
 
@@ -226,6 +231,19 @@ def first_step(point: OrbitPoint, ahead: OrbitPoint) -> float:
     """The longest first step beyond a change of events or of the section, from the first orbit `ahead` of it."""
     way = ahead.curve.norm(ahead.place - point.place)
     return SETTINGS.first * way if way > SETTINGS.near * SETTINGS.probes[0] else np.inf
+
+
+def parent_at(cut: Cut, points: Sequence[OrbitPoint]) -> SpecialPoint | None:
+    """The special point of the parent's branch if a family ends there at a change of events, at which multipliers jump (see
+    `jump_over`); else None."""
+    near, point = TOLERANCES.grazing_orbits, cut.point
+    if cut.special is None or all(is_image(known, near) for known in points):
+        return None
+    way = cut.special.evidence.bracket / max(abs(point.tangent[-1]), TINY)  # how far the change itself may still be
+    parent = parent_of(point, max(near, way * float(np.abs(point.tangent[:-1]).max())))
+    if parent is None:
+        return None
+    return SpecialPoint(SpecialKind.BPC if cut.point.orbit.period % 2 else SpecialKind.PD, parent, cut.special.evidence)
 
 
 def jump_over(cut: Cut, following: OrbitPoint) -> SpecialPoint | None:
@@ -240,7 +258,7 @@ def jump_over(cut: Cut, following: OrbitPoint) -> SpecialPoint | None:
     test, way = FLIP[cut.point.orbit.symmetric], following.place - cut.point.place
     place = cut.point.place + SETTINGS.beside[-1] / following.curve.norm(way) * way
     evaluation = following.curve.evaluate(place, thorough=True)
-    if evaluation is None or events_of_evaluation(evaluation).sequence != events_at(following).sequence:
+    if evaluation is None or events_of(evaluation).sequence != events_at(following).sequence:
         return None
     before, after = (test.value(point) for point in (cut.point, replace(following, place=place, evaluation=evaluation)))
     evidence = replace(cut.special.evidence, before=before, after=after, value=before)
@@ -273,17 +291,16 @@ def _leads_away(point: OrbitPoint, ahead: OrbitPoint, probe: float) -> bool:
     return point.curve.norm(chord) < SETTINGS.near * probe and float(ahead.tangent @ (point.curve.weights**2 * chord)) > 0.0
 
 
-def _is_discontinuous(evaluation: WholeMotionEvaluation) -> bool:
+def _is_discontinuous(evaluation: Any) -> bool:
     """Whether the map jumps: a motion that begins very near to an orbit ends away from it."""
     return bool(np.abs(evaluation.residual).max() > SETTINGS.jump)
 
 
-def _beside(point: OrbitPoint, sequence: EventSequence | None) -> Iterator[tuple[np.ndarray, WholeMotionEvaluation]]:
+def _beside(point: OrbitPoint, sequence: Events | None) -> Iterator[tuple[np.ndarray, Any]]:
     """Places beside a point, with the equations evaluated there, where the events differ from `sequence` or the map jumps: one
     place for each such sequence at each distance. State variables that are held at the section stay held, as on all nearby
     orbits."""
     equations = point.curve.equations
-    assert isinstance(equations, WholeMotionEquations)
     held = equations.held(point.solution.unknowns, equations.at(point.parameters))
     axes = np.delete(np.eye(len(point.place)) / point.curve.weights, list(held), axis=0)
     for distance in SETTINGS.beside:
@@ -293,16 +310,10 @@ def _beside(point: OrbitPoint, sequence: EventSequence | None) -> Iterator[tuple
             evaluation = point.curve.evaluate(place, thorough=True)
             if evaluation is None:
                 continue
-            kind = events_of_evaluation(evaluation).sequence, _is_discontinuous(evaluation)
+            kind = events_of(evaluation).sequence, _is_discontinuous(evaluation)
             if kind != (sequence, False) and kind not in known:
                 known.add(kind)
                 yield place, evaluation
-
-
-def events_of_evaluation(evaluation: WholeMotionEvaluation) -> FollowedEvents:
-    """The events in equations that were evaluated with extremes."""
-    assert evaluation.followed is not None
-    return evaluation.followed
 
 
 def _section_comes(point: OrbitPoint) -> bool:
@@ -314,10 +325,8 @@ def _section_comes(point: OrbitPoint) -> bool:
 def _from_another_section(point: OrbitPoint) -> OrbitPoint | None:
     """The same orbit with its section at a phase farther from all events, and with its tangent there."""
     equations = point.orbit.equations
-    assert isinstance(equations, WholeMotionEquations)
     phase, state = section_of(point.orbit.motion(), point.orbit.frequency)
     moved = equations.with_signature(replace(equations.signature, section=phase))
-    assert isinstance(moved, WholeMotionEquations)
     near = point.beside(SETTINGS.along)
     first = PeriodicOrbit.near(moved, state, point.parameters)
     if near is None or first is None:
@@ -334,7 +343,7 @@ def _from_another_section(point: OrbitPoint) -> OrbitPoint | None:
     return there
 
 
-def kind_between(before: FollowedEvents, after: FollowedEvents) -> SpecialKind | None:
+def kind_between(before: EventSequence, after: EventSequence) -> SpecialKind | None:
     """The kind of change between two neighbouring orbits; None if only the number of impacts of an accumulation changes."""
     kinds = [Counter(event.kind for event in found.sequence) for found in (before, after)]
     more = {kind: kinds[1][kind] - kinds[0][kind] for kind in {*kinds[0], *kinds[1]} if kinds[1][kind] != kinds[0][kind]}
@@ -354,7 +363,7 @@ def kind_between(before: FollowedEvents, after: FollowedEvents) -> SpecialKind |
     return SpecialKind.GR if min(before.distance, after.distance) < SETTINGS.slow else None
 
 
-def first_change(before: FollowedEvents, after: FollowedEvents) -> SpecialKind:
+def first_change(before: EventSequence, after: EventSequence) -> SpecialKind:
     """The kind of change at which two motions from one section part, by the first event that only one of them has."""
     for i in range(max(len(before.events), len(after.events))):
         here = [(found.times[i], found.events[i]) for found in (before, after) if i < len(found.events)]

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 
 from saltus.continuation import End
 from saltus.flow import SegmentColumn
-from saltus.orbits.branches.beyond_switching import Cycle, Switching, begins_excursion, cycle_of, from_next_event
 from saltus.orbits.branches.bifurcations import grazing
 from saltus.orbits.branches.orbit_curve import OrbitPoint
 from saltus.orbits.branches.special_point import OrbitEnd
-from saltus.orbits.equations.contacts import ContactsEquations
-from saltus.orbits.equations.one_contact import OneContactEquations
+from saltus.orbits.equations.contract import OrbitEquations
 from saltus.orbits.signature import Signature
-from saltus.orbits.symmetry import full_point, half_point
 from saltus.orbits.tolerances import TOLERANCES
 
 PROBES = 10.0 ** -np.arange(2, 12.0)  # distances along the new branch, tried in turn until one direction has admissible orbits
-
-BEGUN = (1e-4, 1e-3, 1e-2)  # the same where an excursion from a closed contact begins, whose speeds grow as the distance cubed
-MOST_TOGETHER = 2  # the most events of several contacts that may change at one point
 
 
 def other_side(point: OrbitPoint) -> OrbitPoint | End:
@@ -28,8 +25,6 @@ def other_side(point: OrbitPoint) -> OrbitPoint | End:
     Where the gap touches zero between impacts, the new signature has a pair of impacts without speed there, or a single one at a
     wall, which turns the motion round. Impacts that have lost their speed are left out of it.
     """
-    if isinstance(point.orbit.equations, ContactsEquations):
-        return _beyond_both_halves(point) if point.orbit.symmetric else _with_other_events(point)
     changed = removed(point) if point.orbit.slowest < TOLERANCES.touch else inserted(point)
     if isinstance(changed, End):
         return changed
@@ -38,45 +33,13 @@ def other_side(point: OrbitPoint) -> OrbitPoint | End:
     known = curve.known(unknowns, point.parameters)
     if known is None:
         return End(OrbitEnd.NO_MOTION, point.parameter, detail="on the other side of")
-    return _admissible_direction(curve.along_kernel(known)) or End(OrbitEnd.NO_DIRECTION, point.parameter)
+    return admissible_direction(curve.along_kernel(known)) or End(OrbitEnd.NO_DIRECTION, point.parameter)
 
 
-def _with_other_events(point: OrbitPoint, known: tuple[Cycle, ...] = ()) -> OrbitPoint | End:
-    """`other_side` with several contacts: the first of the possible signatures that this orbit solves and that has admissible
-    orbits beyond.
-
-    Symmetry may let several events change at once; these are then changed one after the other, at most `MOST_TOGETHER`.
-    """
-    here, reason = Switching.at(point), OrbitEnd.TWO_AT_ONCE
-    known = (*known, cycle_of(point.orbit.signature))
-    for events in here.other_signatures():
-        found = here.equations_with(events)
-        if found is None or cycle_of(found[0].signature) in known:
-            continue
-        solved = point.curve.with_equations(found[0]).known(found[1], point.parameters)
-        if solved is None or not np.abs(solved.evaluation.residual).max() < TOLERANCES.switching:
-            continue
-        reason, begun = OrbitEnd.NO_DIRECTION, point.curve.with_equations(found[0]).along_kernel(solved)
-        ahead = _admissible_direction(begun) or (_with_other_events(begun, known) if len(known) < MOST_TOGETHER else None)
-        if isinstance(ahead, OrbitPoint):
-            return ahead
-    return End(reason, point.parameter)
-
-
-def _beyond_both_halves(point: OrbitPoint) -> OrbitPoint | End:
-    """`other_side` of a symmetric orbit with several contacts: first both halves change alike, then, over the full period, one
-    after the other, which may break the symmetry."""
-    for start in (point, from_next_event(point)) if len(point.orbit.signature.events) > 1 else (point,):
-        ahead = _with_other_events(start)
-        if not isinstance(ahead, End):
-            return ahead
-    ahead = _with_other_events(full_point(point))
-    return ahead if isinstance(ahead, End) else half_point(ahead)
-
-
-def _admissible_direction(start: OrbitPoint) -> OrbitPoint | None:
-    begun = begins_excursion(start)  # the equations are then degenerate at `start`: the branch goes on from a point just ahead
-    for probe in BEGUN if begun else PROBES:
+def admissible_direction(start: OrbitPoint, probes: Sequence[float] = PROBES, begun: bool = False) -> OrbitPoint | None:
+    """The point with the direction in which orbits are admissible; with `begun` the first such orbit itself, as the equations are
+    degenerate at `start`."""
+    for probe in probes:
         for point in (start, start.turned()):
             ahead = point.beside(probe)
             if ahead is not None and ahead.orbit.admissible and grazing(ahead) > 0.0:
@@ -84,13 +47,13 @@ def _admissible_direction(start: OrbitPoint) -> OrbitPoint | None:
     return None
 
 
-def _turns_round(equations: OneContactEquations, side: int) -> bool:
+def _turns_round(equations: OrbitEquations, side: int) -> bool:
     """Whether an impact stays on its side, as at a wall."""
     model, load, impact = equations.system.one_contact, equations.system.load, equations.system.impact
     return bool(model.reset(0.0, 1.0, side, load, impact)[0] == side)
 
 
-def inserted(point: OrbitPoint) -> tuple[OneContactEquations, np.ndarray]:
+def inserted(point: OrbitPoint) -> tuple[Any, np.ndarray]:
     """The problem whose signature has additional impacts where the gap touches zero, and its unknowns: they have no speed."""
     equations, signature = point.orbit.equations, point.orbit.signature
     extremes = point.evaluation.extremes
@@ -107,7 +70,7 @@ def inserted(point: OrbitPoint) -> tuple[OneContactEquations, np.ndarray]:
     return equations.with_signature(longer), np.concatenate([unknowns[: 2 * place], touches, unknowns[2 * place :]])
 
 
-def removed(point: OrbitPoint) -> tuple[OneContactEquations, np.ndarray] | End:
+def removed(point: OrbitPoint) -> tuple[Any, np.ndarray] | End:
     """The problem whose signature lacks the impacts that have lost their speed, and its unknowns; or why there is none."""
     equations, signature = point.orbit.equations, point.orbit.signature
     n = len(signature.sides)
@@ -137,7 +100,7 @@ def _vanishing_pair(phases: np.ndarray, speeds: np.ndarray, slow: int, closing: 
     return [slow, neighbour] if abs(distance) < TOLERANCES.pair and speeds[neighbour] < TOLERANCES.pair else []
 
 
-def _without_impacts(point: OrbitPoint, slow: int) -> tuple[OneContactEquations, np.ndarray] | End:
+def _without_impacts(point: OrbitPoint, slow: int) -> tuple[Any, np.ndarray] | End:
     """An orbit that only touches the contact once a period, as an orbit without impacts: the problem and the state at phase 0."""
     equations, signature = point.orbit.equations, point.orbit.signature
     if signature.symmetric:

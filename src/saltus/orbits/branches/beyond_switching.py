@@ -4,15 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from saltus.continuation import End
 from saltus.flow import SegmentEnd, SegmentExtremes, SegmentPlan
+from saltus.orbits.branches.beyond_grazing import admissible_direction
+from saltus.orbits.branches.images import full_point, half_point
 from saltus.orbits.branches.orbit_curve import OrbitPoint
-from saltus.orbits.branches.special_point import SpecialKind
-from saltus.orbits.equations.contacts import AFTER_RELEASE, ContactsEquations, ContactsEvaluation, bounces
+from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind
 from saltus.orbits.signature import ModeChange, Signature
 from saltus.orbits.tolerances import TOLERANCES
+from saltus.systems import System
+
+AFTER_RELEASE = 3  # power of the time with which the gap grows after a release
+# Distances along a branch at which orbits are looked for where an excursion from a closed contact begins: its speeds grow as the
+# distance cubed.
+BEGUN = (1e-4, 1e-3, 1e-2)
+MOST_TOGETHER = 2  # the most events of several contacts that may change at one point
 
 
 @dataclass(frozen=True)
@@ -32,16 +42,14 @@ class Switching:
     """An orbit at which an event appears or is lost."""
 
     point: OrbitPoint
-    equations: ContactsEquations
-    evaluation: ContactsEvaluation
+    equations: Any  # `ContactsEquations`
+    evaluation: Any
     events: tuple[Timed, ...]
 
     @classmethod
     def at(cls, point: OrbitPoint) -> Switching:
         """A point of a curve, with its equations and its events."""
         equations, evaluation = point.orbit.equations, point.solution.evaluation
-        assert isinstance(equations, ContactsEquations)
-        assert isinstance(evaluation, ContactsEvaluation)
         phases = equations.split(point.solution.unknowns)[1].tolist()
         return cls(point, equations, evaluation, tuple(map(Timed, equations.signature.events, phases)))
 
@@ -121,14 +129,13 @@ class Switching:
                 new = [Timed(ModeChange(False, contact, closed & ~(1 << contact)), phase), *new]
             yield [*events[:at], *new, *events[at:]]
 
-    def equations_with(self, events: list[Timed]) -> tuple[ContactsEquations, np.ndarray] | None:
+    def equations_with(self, events: list[Timed]) -> tuple[Any, np.ndarray] | None:
         """The problem with these events and its unknowns at this orbit; None where its motion cannot be followed."""
         closed = int(self.equations.plan[0, SegmentPlan.ALONG])
         changes, period = tuple(timed.event for timed in events), self.equations.signature.period
         symmetric = self.equations.signature.symmetric
         signature = Signature((), period, symmetric, events=changes, closed=0 if events else closed)
         other = self.equations.with_signature(signature)
-        assert isinstance(other, ContactsEquations)
         phases = np.array([timed.phase for timed in events])
         state = self._state_after(events[0]) if events else self._state_at(0.0)
         return None if state is None else (other, other.joined(state, phases))
@@ -157,7 +164,6 @@ def from_next_event(point: OrbitPoint) -> OrbitPoint:
     phases = [timed.phase for timed in here.events]
     events = (*here.equations.signature.events[1:], here.equations.signature.events[0].image(here.equations.images))
     equations = here.equations.with_signature(replace(here.equations.signature, events=events))
-    assert isinstance(equations, ContactsEquations)
     place = SegmentEnd.NUMBERS + 8 * equations.own
     state = here.evaluation.ends[0, place : place + 2 * equations.own]
     curve = point.curve.with_equations(equations)
@@ -179,7 +185,7 @@ def cycle_of(signature: Signature) -> Cycle:
 def begins_excursion(point: OrbitPoint) -> bool:
     """Whether a point has an excursion of no duration after a release: its multipliers and its tangent then have no meaning."""
     equations = point.orbit.equations
-    if not isinstance(equations, ContactsEquations) or not equations.signature.events:
+    if not equations.signature.events:
         return False
     phases = equations.split(point.solution.unknowns)[1]
     apart = np.diff(np.append(phases, phases[:1] + equations.closing))
@@ -197,3 +203,51 @@ def contact_change(point: OrbitPoint) -> SpecialKind:
     orbit, here = point.orbit, Switching.at(point)
     joined = next(iter(here._together()), None) is not None
     return SpecialKind.SW if joined or orbit.pressing <= min(orbit.slowest, orbit.clearance) else SpecialKind.GR
+
+
+def bounces(system: System, contact: int) -> bool:
+    """Whether an impact on a contact has a restitution."""
+    return float(system.impact.restitution_matrix(system.model)[contact][contact]) > 0.0
+
+
+def other_events_side(point: OrbitPoint) -> OrbitPoint | End:
+    """The point of the branch beyond one at which an event appears or is lost, with the direction in which it goes on; or why
+    there is none."""
+    return _beyond_both_halves(point) if point.orbit.symmetric else _with_other_events(point)
+
+
+def _with_other_events(point: OrbitPoint, known: tuple[Cycle, ...] = ()) -> OrbitPoint | End:
+    """`other_events_side`: the first of the possible signatures that this orbit solves and that has admissible
+    orbits beyond.
+
+    Symmetry may let several events change at once; these are then changed one after the other, at most `MOST_TOGETHER`.
+    """
+    here, reason = Switching.at(point), OrbitEnd.TWO_AT_ONCE
+    known = (*known, cycle_of(point.orbit.signature))
+    for events in here.other_signatures():
+        found = here.equations_with(events)
+        if found is None or cycle_of(found[0].signature) in known:
+            continue
+        solved = point.curve.with_equations(found[0]).known(found[1], point.parameters)
+        if solved is None or not np.abs(solved.evaluation.residual).max() < TOLERANCES.switching:
+            continue
+        reason, begun = OrbitEnd.NO_DIRECTION, point.curve.with_equations(found[0]).along_kernel(solved)
+        ahead = _admissible(begun) or (_with_other_events(begun, known) if len(known) < MOST_TOGETHER else None)
+        if isinstance(ahead, OrbitPoint):
+            return ahead
+    return End(reason, point.parameter)
+
+
+def _beyond_both_halves(point: OrbitPoint) -> OrbitPoint | End:
+    """`other_events_side` of a symmetric orbit: first both halves change alike, then, over the full period, one
+    after the other, which may break the symmetry."""
+    for start in (point, from_next_event(point)) if len(point.orbit.signature.events) > 1 else (point,):
+        ahead = _with_other_events(start)
+        if not isinstance(ahead, End):
+            return ahead
+    ahead = _with_other_events(full_point(point))
+    return ahead if isinstance(ahead, End) else half_point(ahead)
+
+
+def _admissible(start: OrbitPoint) -> OrbitPoint | None:
+    return admissible_direction(start, BEGUN, begun=True) if begins_excursion(start) else admissible_direction(start)

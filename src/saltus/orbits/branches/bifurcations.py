@@ -139,3 +139,8 @@ def orbit_tests(orbit: PeriodicOrbit, functions: dict[str, UserFunction]) -> Ite
         yield Test(name, margin(name))
     for name, function in functions.items():
         yield Test(name, value(function))
+
+
+def curve_test(kind: SpecialKind, value: Callable[[Any], float]) -> TestFunction:
+    """A test function along a curve of special points."""
+    return TestFunction(kind, value, GRAZING.width)

@@ -11,16 +11,16 @@ from saltus.continuation import STEPS, Continuation, End, Watch, both_ways
 from saltus.errors import ParameterError, shown
 from saltus.orbits.branches.branch import START, Branch
 from saltus.orbits.branches.branch_events import BranchEvents
+from saltus.orbits.branches.images import full_period, half
 from saltus.orbits.branches.orbit_curve import OrbitPoint, start
 from saltus.orbits.branches.resting_family import RestingEvents, first_point, resting_steps
 from saltus.orbits.branches.special_point import SpecialKind, UserFunction
-from saltus.orbits.equations.contacts import equations_of
-from saltus.orbits.equations.one_contact import OneContactEquations
+from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.equations.resting import RestingOrbit
 from saltus.orbits.finding.from_motion import orbit_near
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
-from saltus.orbits.symmetry import full_period, half, keeps_symmetry
+from saltus.orbits.symmetry import keeps_symmetry
 from saltus.progress import Progress, silent
 
 STEP = STEPS.longest  # the longest step: a thirtieth of the parameter's range, or a tenth of a radian and of a unit of speed
@@ -156,4 +156,4 @@ def _in_other_equations(orbit: PeriodicOrbit, path: str) -> PeriodicOrbit | None
     """The orbit solved for again, if the parameter that is now varied decides whether its contact is a singularity."""
     position, velocity = orbit.state
     state = {orbit.system.model.coordinates[0]: position, "velocity": velocity}
-    return orbit_near(OneContactEquations(orbit.system, Signature((), 1), (path,)), state, orbit.period)
+    return orbit_near(equations_of(orbit.system, Signature((), 1), (path,)), state, orbit.period)

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.orbits.equations.resting import RestingOrbit
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.provenance import provenance
 
@@ -58,11 +57,11 @@ def _columns(orbits: list[PeriodicOrbit]) -> list[tuple[str, np.ndarray, dict[st
         ("highest", column(lambda o: o.highest), {**angle, "long_name": f"max {coordinate}"}),
         ("lowest", column(lambda o: o.lowest), {**angle, "long_name": f"min {coordinate}"}),
         ("stable", column(lambda o: o.stable, np.int8), {}),
-        ("impact_count", column(lambda o: o.signature.impact_count, int), {"long_name": "impacts in one period of the orbit"}),
+        ("impact_count", column(lambda o: o.impact_count, int), {"long_name": "impacts in one period of the orbit"}),
         ("slowest", column(lambda o: o.slowest), {"long_name": "least speed of an impact"}),
         ("clearance", column(lambda o: o.clearance), {"long_name": "least inner minimum of the gap"}),
         ("residual", column(lambda o: o.residual), {}),
-        ("rest_share", column(lambda o: o.rest_share if isinstance(o, RestingOrbit) else 0.0), {}),
+        ("rest_share", column(lambda o: o.rest_share), {}),
     ]
     for name in orbits[0].equations.margins:
         attrs = {"long_name": f"least {name}", "margin_kind": str(model.margin_kind(name))}
@@ -71,14 +70,15 @@ def _columns(orbits: list[PeriodicOrbit]) -> list[tuple[str, np.ndarray, dict[st
 
 
 def _rests(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
-    """Releases and rests of orbits that rest."""
-    resting = [orbit for orbit in orbits if isinstance(orbit, RestingOrbit)]
-    if not resting:
+    """Releases and rests of orbits that rest, in rows of one length."""
+    width = max(len(orbit.releases) for orbit in orbits)
+    if not width:
         return {}
-    return {
-        "releases": (("point", "rest"), np.array([orbit.releases for orbit in resting])),
-        "rests": (("point", "rest"), np.array([orbit.rests for orbit in resting])),
-    }
+
+    def rows(name: str) -> np.ndarray:
+        return np.array([np.pad(getattr(o, name), (0, width - len(o.releases)), constant_values=np.nan) for o in orbits])
+
+    return {name: (("point", "rest"), rows(name)) for name in ("releases", "rests")}
 
 
 def multiplier_columns(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
@@ -136,7 +136,7 @@ def _special(special: tuple[SpecialPoint, ...]) -> dict[str, Any]:
         "special_highest": [s.orbit.highest for s in special],
         "special_lowest": [s.orbit.lowest for s in special],
         "special_slowest": [s.orbit.slowest for s in special],
-        "special_impact_count": [s.orbit.signature.impact_count for s in special],
+        "special_impact_count": [s.orbit.impact_count for s in special],
         "special_period": [s.orbit.period for s in special],
         "special_residual": [s.evidence.residual for s in special],
         "bracket": [s.evidence.bracket for s in special],

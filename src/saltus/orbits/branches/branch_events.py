@@ -4,42 +4,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from saltus.continuation import Continuation, Cut, End, Events, Missed, Zero, located
-from saltus.orbits.branches.beyond_events import (
-    TINY,
-    beyond,
-    change_at,
-    events_at,
-    first_step,
-    jump_over,
-    refused_beyond,
-    same_events,
-    stalled_at,
-)
-from saltus.orbits.branches.beyond_grazing import other_side
-from saltus.orbits.branches.beyond_switching import contact_change
-from saltus.orbits.branches.bifurcations import FLIP, GRAZING, Test, branch_tests, complex_pair, grazing, never_torus
+from saltus.continuation import Continuation, Corrected, Cut, End, Events, Missed, Zero, located
+from saltus.errors import MotionError
+from saltus.orbits.branches.bifurcations import FLIP, Test, branch_tests, complex_pair, grazing, never_torus
 from saltus.orbits.branches.images import (
     beside_image,
     falls_onto_image,
-    halves,
-    is_image,
+    full_period,
     nearest,
     on_family,
-    parent_of,
     passes_image,
     repetition,
-    with_section_of,
 )
-from saltus.orbits.branches.orbit_curve import OrbitPoint
-from saltus.orbits.branches.special_point import OrbitEnd, OrbitMissed, SpecialKind, SpecialPoint, UserFunction
-from saltus.orbits.equations.contacts import ContactsEquations
-from saltus.orbits.equations.whole_motion import WholeMotionEquations
-from saltus.orbits.symmetry import full_point
+from saltus.orbits.branches.orbit_curve import STEEPEST, OrbitPoint
+from saltus.orbits.branches.special_point import OrbitEnd, OrbitMissed, SpecialKind, UserFunction
+from saltus.orbits.equations.contract import Restart
+from saltus.orbits.equations.kinds import equations_of
+from saltus.orbits.finding.from_motion import orbit_from
+from saltus.orbits.signature import Signature
 from saltus.orbits.tolerances import TOLERANCES
 
 Run = Continuation
@@ -56,8 +42,6 @@ class BranchLimits:
     # or the amplitude has shrunk below this share of the largest one, with more impacts than `shrunk_impacts`.
     shrunk: float = 1e-2
     shrunk_impacts: int = 60
-    # With a multiplier above this, neighbouring motions separate so fast that an orbit cannot be solved for.
-    steepest: float = 1e8
     on_circle: float = 1e-9  # Without damping multipliers lie on the unit circle, up to rounding errors smaller than this.
     smallest: float = 1e-7  # An orbit of an amplitude below this has shrunk to rest.
     # An orbit grows without end if its amplitude exceeds this, and exceeds that of the first orbit of the branch by this factor:
@@ -88,7 +72,8 @@ class OrbitEvents(Events):
 
     def closing(self, first: OrbitPoint, ahead: OrbitPoint) -> OrbitPoint:
         """The first orbit of a closed branch, by its state at the section that the branch has when it returns to it."""
-        return with_section_of(first, ahead)
+        found: OrbitPoint = first.curve.equations.at_section_of(first, ahead)
+        return found
 
 
 @dataclass
@@ -109,16 +94,13 @@ class BranchEvents(OrbitEvents):
         begins at one grazing and has gone past the next one."""
         begun = point.iterations == 0  # the first point beyond a grazing: its unknowns are known without solving
         skipped = begun and grazing(point) <= TOLERANCES.touch and grazing(ahead) < 0.0
-        if isinstance(point.orbit.equations, WholeMotionEquations):
-            if abs(ahead.orbit.multipliers[0]) > SETTINGS.steepest:
-                return False  # multipliers grow without bound towards some changes of events: further steps would be rounding
-            if isinstance(self.cut(point, ahead), End):
-                return False  # no change of events leads to the orbits ahead, so they belong to another branch
+        if not point.orbit.equations.accepts(ahead, lambda: self.cut(point, ahead)):
+            return False
         return not skipped and not falls_onto_image(point, ahead)
 
     def barrier(self, point: OrbitPoint) -> Test:
-        """The test function of grazings or, for orbits that are followed through their events, of changes of these events."""
-        return same_events(point) if isinstance(point.orbit.equations, WholeMotionEquations) else GRAZING
+        """The test function of grazings, or of other changes of an orbit's events."""
+        return point.orbit.equations.barrier(point)
 
     def cut(self, point: OrbitPoint, ahead: OrbitPoint) -> Cut | End | None:
         """Where a step is cut: at a grazing, or where a release or a closing of one of several contacts appears or is lost."""
@@ -130,12 +112,7 @@ class BranchEvents(OrbitEvents):
         found = super().cut(point, ahead)
         if not isinstance(found, Cut) or found.special is None:
             return found
-        if isinstance(found.point.orbit.equations, WholeMotionEquations):
-            return change_at(found.special, point)
-        if isinstance(found.point.orbit.equations, ContactsEquations):
-            point = full_point(found.point) if found.point.orbit.symmetric else found.point
-            return Cut(found.point, replace(found.special, kind=contact_change(point)))
-        return found
+        return found.point.orbit.equations.change(found.special, point)
 
     def interrupted(self, run: Run, point: OrbitPoint, ahead: OrbitPoint) -> End | None:
         """The end of a family that reaches orbits that are their own images: at the BPC or PD of the parent's branch at which the
@@ -194,16 +171,18 @@ class BranchEvents(OrbitEvents):
         if graze is not None and any(_same_place(graze, earlier) for earlier in run.special[:-1]):
             run.special.pop()
             return End(OrbitEnd.COMES_BACK, graze.parameter)
-        followed = isinstance(cut.point.orbit.equations, WholeMotionEquations)
-        if followed and (parent := _parent_at(run, cut)) is not None:
+        equations = cut.point.orbit.equations
+        if (parent := equations.born_at(cut, run.points)) is not None:
             run.special.append(parent)
             return End(OrbitEnd.IMAGE, parent.parameter, parent.kind)
-        following = beyond(cut, run.points) if followed else other_side(cut.point)
+        following = equations.beyond(cut, run.points)
+        if isinstance(following, Restart):
+            following = restarted(following, cut.point)
         if isinstance(following, End):
             return following
-        if followed and (jumped := jump_over(cut, following)) is not None:
-            run.special.append(jumped)
-        count, value = _impact_count(following), following.parameter
+        if (further := equations.also_at(cut, following)) is not None:
+            run.special.append(further)
+        count, value = following.orbit.counted_impacts, following.parameter
         if (shorter := repetition(following)) is not None:
             return End(OrbitEnd.GRAZES_ANOTHER, value, detail=shorter)
         if count > SETTINGS.most_impacts:
@@ -211,53 +190,45 @@ class BranchEvents(OrbitEvents):
         return End(OrbitEnd.ACCUMULATES, value, detail=str(count)) if _accumulate(run, following) else following
 
     def first_step(self, points: Sequence[OrbitPoint]) -> float:
-        return first_step(*points[-2:]) if isinstance(points[-1].orbit.equations, WholeMotionEquations) else math.inf
+        before, ahead = points[-2:]
+        return ahead.orbit.equations.first_step(before, ahead)
 
     def stalled(self, run: Run, point: OrbitPoint, step: float) -> Cut | End:
         """The end where even the shortest step fails: because the orbit repels too strongly, or for a reason that is not known.
 
-        An orbit that is followed through its events may stall where these change; there the branch may turn round: a cut.
+        A whole motion may stall where its events change; there the branch may turn round: a cut.
         """
-        if isinstance(point.orbit.equations, WholeMotionEquations):
-            if (end := refused_beyond(point, step, run.bounds)) is not None:
-                return end
-            if (cut := stalled_at(point, step, run.points)) is not None:
-                return cut
-        if point.orbit.equations.system.model.holds_coordinates and (limit := point.orbit.motion().limit) is not None:
-            return End(OrbitEnd.REFUSED, point.parameter, detail=limit)
+        found = point.orbit.equations.stalled(point, step, run.points, run.bounds)
+        if found is not None:
+            return found
         largest = abs(point.orbit.multipliers[0])
-        if largest > SETTINGS.steepest and not point.orbit.grazes:
+        if largest > STEEPEST and not point.orbit.grazes:
             return End(OrbitEnd.REPELS, point.parameter, detail=f"{largest:.1g}")
         return super().stalled(run, point, step)
 
 
-def _parent_at(run: Run, cut: Cut) -> SpecialPoint | None:
-    """The special point of the parent's branch if a family ends there at a change of events, at which multipliers jump (see
-    `jump_over`); else None."""
-    near, point = TOLERANCES.grazing_orbits, cut.point
-    if cut.special is None or all(is_image(known, near) for known in run.points):
-        return None
-    way = cut.special.evidence.bracket / max(abs(point.tangent[-1]), TINY)  # how far the change itself may still be
-    parent = parent_of(point, max(near, way * float(np.abs(point.tangent[:-1]).max())))
-    if parent is None:
-        return None
-    return SpecialPoint(SpecialKind.BPC if cut.point.orbit.period % 2 else SpecialKind.PD, parent, cut.special.evidence)
-
-
-def _impact_count(point: OrbitPoint) -> int:
-    """The number of impacts in one period, without those of accumulations."""
-    return (
-        events_at(point).impact_count
-        if isinstance(point.curve.equations, WholeMotionEquations)
-        else point.orbit.signature.impact_count
-    )
+def restarted(restart: Restart, point: OrbitPoint) -> OrbitPoint | End:
+    """The point with which a branch goes on beyond a point, found from a motion; or why it ends."""
+    paths, period = point.orbit.equations.paths, point.orbit.period
+    base = equations_of(restart.system, Signature((), 1), paths, point.orbit.equations.tol)
+    try:
+        orbit = orbit_from(base, restart.state, period)
+    except MotionError:
+        orbit = None
+    if orbit is None or not orbit.admissible:
+        return restart.end
+    orbit = full_period(orbit) if orbit.symmetric and not point.curve.symmetric else orbit
+    curve, solution = point.curve.with_equations(orbit.equations), orbit.solution
+    found = Corrected(np.append(solution.unknowns, solution.values), solution.evaluation, solution.iterations)
+    ahead = np.append(np.zeros(orbit.equations.size), orbit.solution.values - point.parameters)
+    return curve.with_tangent(found, ahead) or restart.end
 
 
 def _accumulate(run: Run, following: OrbitPoint) -> bool:
     """Whether grazings accumulate: the last ones have all added impacts, close to one value of the parameter or on the way to
     rest."""
     grazings = [s.point for s in run.special if s.kind == SpecialKind.GR][-SETTINGS.accumulating :]
-    counts = [_impact_count(point) for point in (*grazings, following)]
+    counts = [point.orbit.counted_impacts for point in (*grazings, following)]
     if len(grazings) < SETTINGS.accumulating or not (np.diff(counts) > 0).all():
         return False
     span = float(np.ptp([point.parameter for point in grazings]))
@@ -281,7 +252,7 @@ def parent_point(a: OrbitPoint, b: OrbitPoint) -> Zero | None:
     The orbit there is its own image. The family's equations are singular at it; those of the parent, over half of the period, are
     not.
     """
-    equations, first, last = a.curve.equations.halved, halves(a), halves(b)
+    equations, first, last = a.curve.equations.halved, a.halves, b.halves
     assert first is not None
     assert last is not None
     lengths = [float(np.linalg.norm(both[1] - both[0])) for both in (first, last)]

@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from saltus.continuation import End, TestFunction
 from saltus.flow import SegmentColumn
 from saltus.orbits.branches.beyond_grazing import removed
-from saltus.orbits.branches.bifurcations import scaled_determinant
+from saltus.orbits.branches.bifurcations import curve_test, scaled_determinant
 from saltus.orbits.branches.conditions import Singular, cubic, quadratic
 from saltus.orbits.branches.special_curve import SpecialCurvePoint
 from saltus.orbits.branches.special_point import SpecialKind
 from saltus.orbits.tolerances import TOLERANCES
 
-BRACKET_WIDTH = 1e-15  # width of the bracket, in the step that contains the point
 CAP = 1.0  # upper limit of `room`, which would be infinite for a motion without impacts that never comes near the contact
-
-
-def curve_test(kind: SpecialKind, value: Callable[[SpecialCurvePoint], float]) -> TestFunction:
-    """A test function along a curve of special points."""
-    return TestFunction(kind, value, BRACKET_WIDTH)
 
 
 def curve_tests(kind: str, symmetric: bool) -> list[TestFunction]:

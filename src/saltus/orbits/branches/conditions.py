@@ -17,8 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from saltus.orbits.equations.newton import Solution
-from saltus.orbits.equations.one_contact import OneContactEquations, OrbitEvaluation
+from saltus.orbits.equations.contract import OrbitEquations, OrbitEvaluation, Solution
 from saltus.orbits.orbit import PeriodicOrbit
 
 
@@ -52,7 +51,7 @@ class Singular:
     """The condition that a perturbation returns after the period of the equations: as it was (closing +1), or with the other sign
     (-1)."""
 
-    equations: OneContactEquations
+    equations: OrbitEquations
     closing: float
     border: tuple[np.ndarray, np.ndarray]
 
@@ -106,7 +105,7 @@ class Singular:
 class Slow:
     """The condition that impact `index` has no speed: a grazing, in the signature that has this impact."""
 
-    equations: OneContactEquations
+    equations: OrbitEquations
     index: int
 
     def moved(self, at: ConditionValue) -> Slow:

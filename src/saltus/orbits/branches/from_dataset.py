@@ -11,8 +11,8 @@ from saltus.checks import check_dataset
 from saltus.continuation import NEWTON
 from saltus.errors import ParameterError
 from saltus.flow import load_releases
-from saltus.orbits.equations.contacts import equations_of
-from saltus.orbits.equations.one_contact import OneContactEquations
+from saltus.orbits.equations.contract import OrbitEquations
+from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.equations.resting import resting_orbit
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import ModeChange, Signature
@@ -57,7 +57,7 @@ def orbits_of(dataset: xarray.Dataset) -> list[PeriodicOrbit]:
         return _resting_orbits(dataset, system)
     paths = tuple(map(str, dataset["path"].values)) if "path" in dataset.coords else (str(dataset.attrs["path"]),)
     values = np.atleast_2d(dataset["parameter"].values.T).T
-    known: dict[Signature, OneContactEquations] = {}
+    known: dict[Signature, OrbitEquations] = {}
     orbits = []
     for signature, row, value in zip(_signatures(dataset), dataset["unknowns"].values, values, strict=True):
         if signature not in known:
@@ -85,7 +85,7 @@ def _signature(sides: np.ndarray, periods: Any, symmetric: Any, side: Any) -> Si
     return Signature(tuple(int(s) for s in sides if s), int(periods), bool(symmetric), int(side))
 
 
-def _orbit(equations: OneContactEquations, row: np.ndarray, value: np.ndarray) -> PeriodicOrbit:
+def _orbit(equations: OrbitEquations, row: np.ndarray, value: np.ndarray) -> PeriodicOrbit:
     values = value.astype(float)
     orbit = PeriodicOrbit.known(equations, row[: equations.size].copy(), values)
     scale = max(1.0, float(np.abs(row[: equations.size]).max()))
@@ -102,7 +102,7 @@ def _resting_orbits(dataset: xarray.Dataset, system: System) -> list[PeriodicOrb
     for first, value, periods in zip(dataset["releases"].values[:, 0], *(dataset[name].values for name in columns), strict=True):
         here = system.with_({path: float(value)})
         nearest = min(load_releases(here), key=lambda release: abs(release.time - first), default=None)
-        orbit = resting_orbit(OneContactEquations(here, Signature((), 1), (path,)), nearest, int(periods)) if nearest else None
+        orbit = resting_orbit(equations_of(here, Signature((), 1), (path,)), nearest, int(periods)) if nearest else None
         if orbit is None:
             raise ParameterError(f"no orbit rests at {path} = {value:g}: the file is damaged, or of another version of saltus")
         orbits.append(orbit)

@@ -11,9 +11,11 @@ import numpy as np
 from saltus.continuation import STEPS, Corrected, EquationCurve, Point
 from saltus.flow import SegmentValue
 from saltus.orbits.branches.special_point import SpecialPoint
-from saltus.orbits.equations.newton import Solution
-from saltus.orbits.equations.one_contact import OneContactEquations, OrbitEvaluation
+from saltus.orbits.equations.contract import OrbitEquations, OrbitEvaluation, Solution
 from saltus.orbits.orbit import PeriodicOrbit
+
+# With a multiplier above this, neighbouring motions separate so fast that an orbit cannot be solved for.
+STEEPEST = 1e8
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,15 +38,10 @@ class OrbitPoint(Point):
         return PeriodicOrbit(self.curve.equations, self.solution)
 
     @cached_property
-    def half_way(self) -> np.ndarray | None:
-        """The difference of the image of an orbit without impacts from the orbit; None where it cannot be its own image."""
-        equations, odd = self.curve.equations, self.orbit.signature.period % 2
-        sides = equations.system.model.has_one_contact and not equations.passes_contact
-        if equations.signature.sides or equations.signature.closed or (odd and (sides or not self.curve.symmetric)):
-            return None
-        n = equations.size
-        half_way: np.ndarray | None = equations.half_way(self.place[:n], self.place[n:], self.evaluation)
-        return half_way
+    def halves(self) -> np.ndarray | None:
+        """The unknowns of both halves of its period, see `OrbitEquations.halves`."""
+        found: np.ndarray | None = self.curve.equations.halves(self.solution, self.curve.symmetric)
+        return found
 
     @property
     def residual(self) -> float:
@@ -57,7 +54,7 @@ class OrbitCurve(EquationCurve[OrbitPoint]):
     """The orbits of one problem along its parameters, measured by a norm that depends neither on the number of impacts nor on
     the units of the parameters."""
 
-    equations: OneContactEquations
+    equations: OrbitEquations
     scales: tuple[float, ...]  # of the parameters
     symmetric: bool = False  # whether the system has the mirror symmetry all along it
 
@@ -67,14 +64,14 @@ class OrbitCurve(EquationCurve[OrbitPoint]):
         return len(self.scales)
 
     @property
-    def stray(self) -> float:  # type: ignore[override]
+    def corrector_radius(self) -> float:  # type: ignore[override]
         """How far from the predicted point the corrector may look for the next one."""
-        return self.equations.stray
+        return self.equations.corrector_radius
 
     @property
-    def rounded(self) -> float:  # type: ignore[override]
+    def residual_floor(self) -> float:  # type: ignore[override]
         """The largest residual that rounding may leave."""
-        return self.equations.rounded
+        return self.equations.residual_floor
 
     @cached_property
     def weights(self) -> np.ndarray:
@@ -108,7 +105,7 @@ class OrbitCurve(EquationCurve[OrbitPoint]):
             return angle
         return min(angle, super().turn(a, _seen_from(a, b)))
 
-    def with_equations(self, equations: OneContactEquations) -> OrbitCurve:
+    def with_equations(self, equations: OrbitEquations) -> OrbitCurve:
         """The curve of another problem of the same system."""
         return OrbitCurve(equations, self.scales, self.symmetric)
 

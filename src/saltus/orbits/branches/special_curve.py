@@ -13,8 +13,7 @@ from saltus.orbits.branches.branch_dataset import multiplier_columns, solution_c
 from saltus.orbits.branches.conditions import Condition, ConditionValue, Slow
 from saltus.orbits.branches.orbit_curve import OrbitCurve, OrbitPoint
 from saltus.orbits.branches.special_point import SpecialPoint
-from saltus.orbits.equations.newton import Solution
-from saltus.orbits.equations.one_contact import OrbitEvaluation
+from saltus.orbits.equations.contract import OrbitEvaluation, Solution
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.provenance import provenance
 from saltus.result import Result

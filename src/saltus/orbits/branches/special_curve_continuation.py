@@ -11,25 +11,18 @@ import numpy as np
 from saltus.checks import check_bounds, check_count, check_path, check_step
 from saltus.continuation import STEPS, Continuation, Cut, End, TestFunction, both_ways
 from saltus.errors import ParameterError
-from saltus.orbits.branches.beyond_events import change_at, same_events
-from saltus.orbits.branches.beyond_grazing import inserted
-from saltus.orbits.branches.beyond_switching import contact_change
-from saltus.orbits.branches.bifurcations import grazing
 from saltus.orbits.branches.branch_continuation import STEP
 from saltus.orbits.branches.branch_events import OrbitEvents
-from saltus.orbits.branches.codimension import curve_test, curve_tests, room
+from saltus.orbits.branches.codimension import curve_tests
 from saltus.orbits.branches.conditions import Condition, Singular, Slow
+from saltus.orbits.branches.images import divide, half
 from saltus.orbits.branches.special_curve import ConditionedCurve, SpecialCurve, SpecialCurvePoint, without_condition
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint
-from saltus.orbits.equations.contacts import ContactsEquations, equations_of
-from saltus.orbits.equations.one_contact import OneContactEquations
+from saltus.orbits.equations.contract import OrbitEquations
+from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.equations.resting import RestingOrbit
-from saltus.orbits.equations.whole_motion import WholeMotionEquations
-from saltus.orbits.finding.contact_signature import section_of
-from saltus.orbits.finding.from_motion import divide
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.signature import Signature
-from saltus.orbits.symmetry import full_point, half, keeps_symmetry, over_full_period
+from saltus.orbits.symmetry import keeps_symmetry
 from saltus.orbits.tolerances import TOLERANCES
 from saltus.progress import Progress, silent
 from saltus.systems import check_system
@@ -54,10 +47,8 @@ class CurveEvents(OrbitEvents):
 
     def barrier(self, point: Any) -> TestFunction:
         """Another grazing, or another change of the events of an orbit with several contacts or friction."""
-        if isinstance(point.orbit.equations, WholeMotionEquations):
-            return same_events(point)
-        several = isinstance(point.orbit.equations, ContactsEquations)
-        return curve_test(SpecialKind[f"{self.kind}_GR"], grazing if several else room)
+        barrier: TestFunction = point.orbit.equations.curve_barrier(self.kind, point)
+        return barrier
 
     def cut(self, point: SpecialCurvePoint, ahead: SpecialCurvePoint) -> Cut | End | None:
         """The cut where the orbit's events change, with the codimension-two point there; without a special point where only an
@@ -65,15 +56,14 @@ class CurveEvents(OrbitEvents):
         found = super().cut(point, ahead)
         if not isinstance(found, Cut) or found.special is None or isinstance(point.condition, Slow):
             return found
-        plain, change = without_condition(found.point), SpecialKind.GR
-        if isinstance(point.orbit.equations, WholeMotionEquations):
-            there = change_at(replace(found.special, point=plain), without_condition(point))
-            if isinstance(there, End) or there.special is None:
-                return there if isinstance(there, End) else Cut(found.point, None)
-            change = SpecialKind[there.special.kind]
-        elif isinstance(point.orbit.equations, ContactsEquations):
-            change = contact_change(full_point(plain) if plain.orbit.symmetric else plain)
-        kind = SpecialKind[f"{self.kind}_GR" if change is SpecialKind.GR else f"{self.kind}_SW"]
+        zero, before = replace(found.special, point=without_condition(found.point)), without_condition(point)
+        there = point.orbit.equations.change(zero, before)
+        if isinstance(there, End):
+            return there
+        if there.special is None:
+            return Cut(found.point, None)
+        grazes = there.special.kind == SpecialKind.GR or there.special.kind.endswith("-GR")
+        kind = SpecialKind[f"{self.kind}_GR" if grazes else f"{self.kind}_SW"]
         return Cut(found.point, replace(found.special, kind=kind))
 
     def across(self, run: Continuation, cut: Cut) -> SpecialCurvePoint | End:
@@ -142,7 +132,7 @@ def continue_special(
     check_count("most_points", most_points, 1)
     if special.kind not in FOLLOWED:
         raise ParameterError(f"curves are followed of {', '.join(FOLLOWED)}, not of {special.kind}", "special")
-    if special.kind == SpecialKind.GR and special.orbit.system.model.holds_coordinates:
+    if special.kind == SpecialKind.GR and special.orbit.equations.touched(special) is None:
         raise ParameterError(
             "of models with several contacts or friction curves are followed of LP, PD and BPC, not of GR so far; "
             "continue an orbit at several values of the second parameter instead",
@@ -208,12 +198,10 @@ def _from_another_section(point: SpecialCurvePoint) -> SpecialCurvePoint | None:
     """The same point with the section at a phase farther from all events, to be followed in the same direction as before."""
     condition, equations = point.condition, point.orbit.equations
     assert isinstance(condition, Singular)
-    phase, state = section_of(point.orbit.motion(), point.orbit.frequency)
-    moved = equations.with_signature(replace(equations.signature, section=phase))
-    orbit = PeriodicOrbit.near(moved, state, point.parameters)
+    orbit = equations.at_another_section(point.orbit)
     if orbit is None:
         return None
-    curve = ConditionedCurve(moved, point.curve.scales, condition=Singular.near(orbit, condition.closing))
+    curve = ConditionedCurve(orbit.equations, point.curve.scales, condition=Singular.near(orbit, condition.closing))
     there, k = curve.along_condition(orbit), len(point.parameters)
     if there is None:
         return None
@@ -233,8 +221,10 @@ def _defined(special: SpecialPoint, paths: tuple[str, str]) -> tuple[PeriodicOrb
             "branch again, and continue the special points into which this one splits"
         )
     if kind == SpecialKind.GR:
-        signature, unknowns = _touching(special)
-        orbit = _evaluated(OneContactEquations(system, signature, paths), unknowns, values)
+        touched = old.touched(special)
+        assert touched is not None, "refused before"
+        signature, unknowns = touched
+        orbit = _evaluated(equations_of(system, signature, paths), unknowns, values)
         return orbit, Slow(orbit.equations, _first_without_speed(orbit.equations, unknowns))
     equations = equations_of(system, old.signature, paths)
     if old.passes_contact and not equations.passes_contact:
@@ -243,7 +233,7 @@ def _defined(special: SpecialPoint, paths: tuple[str, str]) -> tuple[PeriodicOrb
             f"a little, follow the branch again, and continue the {kind} from there"
         )
     if kind == SpecialKind.LP and old.signature.symmetric and not symmetric:
-        equations, unknowns = over_full_period(equations, unknowns)
+        equations, unknowns = equations.over_full_period(unknowns)
     orbit = _evaluated(equations, unknowns, values)
     if kind == SpecialKind.PD:
         orbit = divide(orbit) or orbit
@@ -255,23 +245,14 @@ def _defined(special: SpecialPoint, paths: tuple[str, str]) -> tuple[PeriodicOrb
     return orbit, Singular.near(orbit, 1.0 if kind == SpecialKind.LP else -1.0)
 
 
-def _evaluated(equations: OneContactEquations, unknowns: np.ndarray, values: np.ndarray) -> PeriodicOrbit:
+def _evaluated(equations: OrbitEquations, unknowns: np.ndarray, values: np.ndarray) -> PeriodicOrbit:
     orbit = PeriodicOrbit.known(equations, unknowns, values)
     if orbit is None:
         raise ParameterError("the motion of the special point cannot be followed; locate it again on its branch")
     return orbit
 
 
-def _touching(special: SpecialPoint) -> tuple[Signature, np.ndarray]:
-    """Of the two signatures that meet at a grazing the one with more impacts, and the orbit's unknowns in it."""
-    point = special.point
-    if point.orbit.slowest < TOLERANCES.touch:  # the signature has an impact where the orbit touches, and the gap a minimum
-        return point.orbit.signature, point.solution.unknowns
-    equations, unknowns = inserted(point)
-    return equations.signature, unknowns
-
-
-def _first_without_speed(equations: OneContactEquations, unknowns: np.ndarray) -> int:
+def _first_without_speed(equations: OrbitEquations, unknowns: np.ndarray) -> int:
     """The number of the impact without speed; of a pair, the first one."""
     phases, speeds = unknowns[::2], unknowns[1::2]
     slow = int(np.argmin(np.abs(speeds)))

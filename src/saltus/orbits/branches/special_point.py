@@ -160,6 +160,6 @@ class SpecialPoint(Zero):
         place = ", ".join(f"{value:.12g}" for value in self.parameters)
         return (
             f"SpecialPoint(kind='{self.kind}', {'parameter' if len(self.parameters) == 1 else 'parameters'}={place}, "
-            f"amplitude={self.amplitude:.9g}, period {self.orbit.period}, {self.orbit.signature.impact_count} impacts, "
+            f"amplitude={self.amplitude:.9g}, period {self.orbit.period}, {self.orbit.impact_count} impacts, "
             f"bracket {self.evidence.bracket:.1g})"
         )

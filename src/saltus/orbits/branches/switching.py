@@ -12,10 +12,10 @@ from saltus.continuation import End
 from saltus.errors import ParameterError
 from saltus.orbits.branches.branch import Branch
 from saltus.orbits.branches.branch_continuation import STEP, follow_from
+from saltus.orbits.branches.images import full_period
 from saltus.orbits.branches.orbit_curve import OrbitPoint
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint, UserFunction
-from saltus.orbits.equations.one_contact import OneContactEquations
-from saltus.orbits.symmetry import full_period
+from saltus.orbits.equations.contract import OrbitEquations
 from saltus.progress import Progress, silent
 from saltus.result import Result, result_dataset
 
@@ -94,24 +94,18 @@ def _doubled(point: OrbitPoint) -> OrbitPoint | None:
     equations, signature = point.orbit.equations, point.orbit.signature
     if 2 * signature.period > MOST_DOUBLED:
         return None
-    events, sides = 2 * signature.events, 2 * signature.sides
-    twice = replace(signature, sides=sides, events=events, period=2 * signature.period, symmetric=False)
-    unknowns, direction = point.solution.unknowns, _kernel(point.evaluation.jacobian(-1.0))
-    if sides or events:
-        unknowns, direction = equations.repeated(unknowns), equations.alternating(direction)
-    return _along(point, equations.with_signature(twice), unknowns, direction)
+    direction = equations.alternating(_kernel(point.evaluation.jacobian(-1.0)))
+    return _along(point, equations.with_signature(signature.repeated()), equations.repeated(point.solution.unknowns), direction)
 
 
 def _unsymmetric(point: OrbitPoint) -> tuple[OrbitPoint | None, ...]:
     """The symmetric orbit over its full period, and the two directions in which its halves differ."""
     orbit = full_period(point.orbit)
-    direction = _kernel(point.evaluation.jacobian(-1.0))
-    if point.orbit.signature.sides or point.orbit.signature.events:
-        direction = point.orbit.equations.alternating(direction)
+    direction = point.orbit.equations.alternating(_kernel(point.evaluation.jacobian(-1.0)))
     return tuple(_along(point, orbit.equations, orbit.solution.unknowns, sign * direction) for sign in (1.0, -1.0))
 
 
-def _along(point: OrbitPoint, equations: OneContactEquations, unknowns: np.ndarray, direction: np.ndarray) -> OrbitPoint | None:
+def _along(point: OrbitPoint, equations: OrbitEquations, unknowns: np.ndarray, direction: np.ndarray) -> OrbitPoint | None:
     """The first point of the new branch, to be followed in a direction of the unknowns."""
     curve, tangent = point.curve.with_equations(equations), np.append(direction, 0.0)
     known = curve.known(unknowns, point.parameters)

@@ -11,26 +11,44 @@ mirror image.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from saltus.flow import ContactColumn, EventCode, SegmentColumn, SegmentEnd, SegmentExtremes, SegmentPlan, load_contact_segments
-from saltus.orbits.equations.one_contact import ORBIT_TOLERANCE, OneContactEquations, OrbitEvaluation
-from saltus.orbits.equations.whole_motion import WholeMotionEquations
+from saltus.continuation import Bounds, Cut, End, TestFunction, Zero
+from saltus.errors import MotionError
+from saltus.flow import (
+    ContactColumn,
+    EventCode,
+    EventKind,
+    SegmentColumn,
+    SegmentEnd,
+    SegmentExtremes,
+    SegmentPlan,
+    load_contact_segments,
+)
+from saltus.orbits.branches.beyond_switching import AFTER_RELEASE, bounces, contact_change, other_events_side
+from saltus.orbits.branches.bifurcations import GRAZING, curve_test, grazing
+from saltus.orbits.branches.images import full_point
+from saltus.orbits.branches.orbit_curve import OrbitPoint
+from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind
+from saltus.orbits.equations.contract import MotionToRead, OrbitEquations, OrbitEvaluation, Solution
+from saltus.orbits.equations.read_events import STAYS, read_signature
+from saltus.orbits.finding.starts import start_at
 from saltus.orbits.signature import ModeChange, Signature
 from saltus.orbits.tolerances import TOLERANCES
 from saltus.systems import System, image_of
 from saltus.taylor import FREQUENCY
 
-AFTER_RELEASE, AFTER_IMPACT = 3, 2  # power of the time with which the gap grows after a release, and after an impact with e = 0
+AFTER_IMPACT = 2  # power of the time with which the gap grows after an impact with e = 0; after a release it is `AFTER_RELEASE`
 START_SHARE = 0.4  # where in a segment a motion is started; not in its middle, where symmetric orbits may touch a contact
 
 
 @dataclass(frozen=True)
 class ContactsEvaluation(OrbitEvaluation):
-    """The problem at one point; its derivatives are `here`, to the unknowns, and `there`, to the unknowns a period later."""
+    """The equations at one point; their derivatives are `here`, to the unknowns, and `there`, to the unknowns a period later."""
 
     seen: np.ndarray  # (n, ...): the extremes along each segment, in the columns of `SegmentExtremes`; empty if not asked for
     state_count: int  # how many of the unknowns are the state; the others are phases
@@ -55,8 +73,25 @@ class ContactsEvaluation(OrbitEvaluation):
                 return np.full((len(state), len(state)), np.inf)
 
 
-class ContactsEquations(OneContactEquations):
-    """The equations of one signature of a system with several contacts."""
+class ContactsEquations(OrbitEquations):
+    """The equations from event to event of a system with several contacts."""
+
+    @classmethod
+    def solves(cls, system: System, signature: Signature) -> bool:
+        return signature.section is None and system.model.holds_coordinates
+
+    @classmethod
+    def read(cls, base: OrbitEquations, motion: MotionToRead) -> tuple[OrbitEquations, np.ndarray] | None:
+        """None with frictions or with accumulations of impacts, for which there are no equations from event to event."""
+        if not cls.solves(base.system, base.signature) or base.system.model.frictions:
+            return None
+        if motion.twice.limit is not None or len(motion.twice.events.of(EventKind.HELD)):
+            return None
+        signature, first, phases = read_signature(motion.twice, motion.periods, base.frequency(base.values))
+        found = cls(base.system, signature, base.paths, base.tol)
+        if not found.size:
+            raise MotionError(STAYS)
+        return found, found.joined(first, phases)
 
     @cached_property
     def plan(self) -> np.ndarray:
@@ -107,22 +142,42 @@ class ContactsEquations(OneContactEquations):
     def alternating(self, direction: np.ndarray) -> np.ndarray:
         return np.append(direction, -direction[len(self._free) :])
 
-    def impacts(self, unknowns: np.ndarray, evaluation: OrbitEvaluation) -> tuple[np.ndarray, np.ndarray]:
+    def impacts(self, solution: Solution) -> tuple[np.ndarray, np.ndarray]:
         chosen = np.array([event.is_impact for event in self.signature.events], dtype=bool)
-        speeds = -np.roll(evaluation.ends[:, SegmentEnd.RATE], 1)[: len(chosen)]
-        return self.split(unknowns)[1][chosen], speeds[chosen]
+        speeds = -np.roll(solution.evaluation.ends[:, SegmentEnd.RATE], 1)[: len(chosen)]
+        return self.split(solution.unknowns)[1][chosen], speeds[chosen]
 
-    def touching_speed(self, unknowns: np.ndarray, evaluation: OrbitEvaluation) -> float:
+    def touching_speed(self, solution: Solution) -> float:
         rows = (self.plan[:, SegmentPlan.KIND] == EventCode.IMPACT) & (self.plan[:, SegmentPlan.POWER] == 0)
-        return float((-evaluation.ends[rows, SegmentEnd.RATE]).min(initial=math.inf))
+        return float((-solution.evaluation.ends[rows, SegmentEnd.RATE]).min(initial=math.inf))
 
-    def pressing(self, unknowns: np.ndarray, evaluation: OrbitEvaluation) -> float:
+    def pressing(self, solution: Solution) -> float:
         """The least of the reactions of closed contacts, the times between events, and the gaps of other contacts at impacts."""
-        assert isinstance(evaluation, ContactsEvaluation)
-        phases = self.split(unknowns)[1]
+        phases = self.split(solution.unknowns)[1]
         apart = np.diff(np.append(phases, phases[:1] + self.closing))
-        forces = evaluation.seen[:, [SegmentExtremes.FORCE, SegmentExtremes.PULL, SegmentExtremes.TAIL, SegmentExtremes.BESIDE]]
-        return float(min(forces.min(), apart.min(initial=math.inf)))
+        columns = [SegmentExtremes.FORCE, SegmentExtremes.PULL, SegmentExtremes.TAIL, SegmentExtremes.BESIDE]
+        return float(min(solution.evaluation.seen[:, columns].min(), apart.min(initial=math.inf)))
+
+    def nearest(self, unknowns: np.ndarray, values: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
+        """Unchanged: events are not renumbered."""
+        return unknowns if not self.signature.events and self.signature == other.orbit.signature else None
+
+    def barrier(self, point: OrbitPoint) -> TestFunction:
+        return GRAZING
+
+    def change(self, zero: Zero, point: OrbitPoint) -> Cut | End:
+        at = full_point(zero.point) if zero.point.orbit.symmetric else zero.point
+        return Cut(zero.point, replace(zero, kind=contact_change(at)))
+
+    def beyond(self, cut: Cut, points: list[OrbitPoint]) -> OrbitPoint | End:
+        return other_events_side(cut.point)
+
+    def stalled(self, point: OrbitPoint, step: float, points: list[OrbitPoint], bounds: Bounds) -> Cut | End | None:
+        limit = point.orbit.motion().limit
+        return None if limit is None else End(OrbitEnd.REFUSED, point.parameter, detail=limit)
+
+    def curve_barrier(self, kind: str, point: Any) -> TestFunction:
+        return curve_test(SpecialKind[f"{kind}_GR"], grazing)
 
     def evaluate(
         self, unknowns: np.ndarray, values: np.ndarray, with_extremes: bool = False, *, later: np.ndarray | None = None
@@ -220,32 +275,36 @@ class ContactsEquations(OneContactEquations):
         extremes[:, SegmentColumn.LEAST_MARGIN :] = seen[:, SegmentExtremes.MARGINS :]
         return extremes
 
-    def within(self, unknowns: np.ndarray, evaluation: OrbitEvaluation, values: np.ndarray) -> tuple[np.ndarray, float]:
-        """A state within the longest segment, and its time; for an orbit without events, the state at phase 0."""
-        state, phases = self.split(unknowns)
+    def start(self, solution: Solution) -> dict[str, Any]:
+        """Within the longest segment; for an orbit without events, at phase 0."""
+        state, phases = self.split(solution.unknowns)
+        values, system = solution.values, self.at(solution.values)
         if not phases.size:
-            return self._with_held(state, self.signature.closed, values), 0.0
+            return {**start_at(system, self._with_held(state, self.signature.closed, values)), "time": 0.0}
         times = np.append(phases, phases[0] + self.closing) / self.frequency(values)
         longest = int(np.argmax(np.diff(times)))
-        begin = evaluation.ends[longest, SegmentEnd.NUMBERS : SegmentEnd.NUMBERS + 2 * self.own]
+        begin = solution.evaluation.ends[longest, SegmentEnd.NUMBERS : SegmentEnd.NUMBERS + 2 * self.own]
         part = times[longest] + np.array([0.0, START_SHARE]) * (times[longest + 1] - times[longest])
         there = self.carried_along(begin, int(self.plan[longest, SegmentPlan.ALONG]), part, values)
         assert there is not None, "an orbit's own segments can be followed"
-        return there, float(part[1])
+        return {**start_at(system, there), "time": float(part[1])}
 
-    def halves(self, unknowns: np.ndarray, evaluation: OrbitEvaluation) -> np.ndarray | None:
-        """The unknowns of both halves of a period, each as unknowns of the equations over one half, (2, n); None where the events
-        of the halves differ."""
-        events, half = self.signature.events, len(self.signature.events) // 2
-        odd, own = self.signature.period % 2, self.own
+    def halves(self, solution: Solution, mirrored: bool) -> np.ndarray | None:
+        signature, unknowns = self.signature, solution.unknowns
+        events, half, odd = signature.events, len(signature.events) // 2, signature.period % 2
+        if signature.symmetric or signature.closed or (odd and not mirrored):
+            return None
+        if not events:
+            found = self.halved.evaluate(unknowns, solution.values)
+            return None if found is None else np.stack([unknowns, unknowns + found.residual])
         image = tuple(event.image(self.images) for event in events[:half]) if odd else events[:half]
         if len(events) % 2 or events[half:] != image:
             return None
         state, phases = self.split(unknowns)
-        place = SegmentEnd.NUMBERS + 8 * own
-        later = evaluation.ends[half - 1, place : place + 2 * own]
+        place = SegmentEnd.NUMBERS + 8 * self.own
+        later = solution.evaluation.ends[half - 1, place : place + 2 * self.own]
         later = image_of(self.system.model, later) if odd else later
-        first, second = self.joined(state, phases[:half]), self.joined(later, phases[half:] - np.pi * self.signature.period)
+        first, second = self.joined(state, phases[:half]), self.joined(later, phases[half:] - np.pi * signature.period)
         return np.stack([first, second])
 
     def _with_held(self, state: np.ndarray, closed: int, values: np.ndarray) -> np.ndarray:
@@ -257,19 +316,6 @@ class ContactsEquations(OneContactEquations):
         return state
 
 
-def bounces(system: System, contact: int) -> bool:
-    """Whether an impact on a contact has a restitution."""
-    return float(system.impact.restitution_matrix(system.model)[contact][contact]) > 0.0
-
-
 def no_event(closed: int) -> np.ndarray:
     """The plan of one segment without an event at its end."""
     return np.array([[closed, -1, -1, closed, 0, -1]], dtype=np.int64)
-
-
-def equations_of(
-    system: System, signature: Signature, paths: tuple[str, ...] = (), tol: float = ORBIT_TOLERANCE
-) -> OneContactEquations:
-    """The problem of a signature: with one contact, with several, or, if the signature has a section, followed as one motion."""
-    kind: type[OneContactEquations] = ContactsEquations if system.model.holds_coordinates else OneContactEquations
-    return (kind if signature.section is None else WholeMotionEquations)(system, signature, paths, tol)

@@ -54,7 +54,7 @@ class Group(NamedTuple):
 
 
 @dataclass(frozen=True)
-class FollowedEvents:
+class EventSequence:
     """The events of an orbit from its section on, and how near it is to an orbit with other events."""
 
     events: tuple[OrbitEvent, ...]
@@ -91,7 +91,7 @@ class FollowedEvents:
         return least
 
 
-def events_of(motion: Motion, sampled: SampledMotion, images: Sequence[int] | None = None) -> FollowedEvents:
+def sequence_of(motion: Motion, sampled: SampledMotion, images: Sequence[int] | None = None) -> EventSequence:
     """The events of one period of an orbit, whose motion begins at its section.
 
     With `images`, the number of the mirror image of each contact and friction, the motion is half a period of a symmetric orbit:
@@ -111,7 +111,7 @@ def events_of(motion: Motion, sampled: SampledMotion, images: Sequence[int] | No
         apart += np.diff([*own, own[0] + period]).tolist() if len(own) > 1 else []
     distance = float(min([sampled.nearest_touch(), *speeds, *(time for time in apart if time > ONE_INSTANT * period)]))
     events, times = _in_order(events, times, ONE_INSTANT * period)
-    return FollowedEvents(events, times, period, max(distance, 0.0), section_distance, groups)
+    return EventSequence(events, times, period, max(distance, 0.0), section_distance, groups)
 
 
 def _groups(motion: Motion) -> tuple[Group, ...]:

@@ -16,86 +16,24 @@ The equations of a symmetric orbit cover half a period, after which it is its mi
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from saltus.errors import ParameterError
-from saltus.flow import (
-    STRUCTURE_SIZES,
-    ContactRegularity,
-    SegmentColumn,
-    SegmentValue,
-    Where,
-    contact_regularity,
-    load_segments,
-    program,
-    taylor_order,
-)
+from saltus.continuation import Cut, End, TestFunction, Zero
+from saltus.flow import ContactRegularity, EventKind, SegmentColumn, SegmentValue, Where, contact_regularity, load_segments
+from saltus.orbits.branches.beyond_grazing import inserted, other_side
+from saltus.orbits.branches.bifurcations import GRAZING, curve_test
+from saltus.orbits.branches.codimension import room
+from saltus.orbits.branches.orbit_curve import OrbitPoint
+from saltus.orbits.branches.special_point import SpecialKind
+from saltus.orbits.equations.contract import MotionToRead, OrbitEquations, OrbitEvaluation, Solution
+from saltus.orbits.finding.starts import start_at, state_vector
 from saltus.orbits.signature import Signature
-from saltus.systems import System, contact_images, numbers
-from saltus.taylor import FREQUENCY, record_table
-
-ORBIT_TOLERANCE = 1e-14  # of the segments' steps: the orbits are then exact to rounding
-
-
-@dataclass(frozen=True)
-class OrbitEvaluation:
-    """The problem at one point: the residual and its derivatives, one block for each segment, and extremes along the segments.
-
-    Block row i of the Jacobian has `here[i]` in the columns of the unknowns of segment i, and `there[i]` in those of the next
-    one.
-    """
-
-    residual: np.ndarray  # (n d,)
-    here: np.ndarray  # (n, d, d)
-    there: np.ndarray  # (n, d, d)
-    parameters: np.ndarray  # (n d, parameters)
-    ends: np.ndarray
-    extremes: np.ndarray  # (n, 4 + margins): extrema within each segment, by `HUMP`, ... of `segments.py`; empty if not asked for
-
-    def jacobian(self, closing: float = 1.0) -> np.ndarray:
-        """The derivatives to the unknowns; with `closing` -1 for perturbations that change their sign each (half) period."""
-        matrix = np.zeros((len(self.residual), len(self.residual)))
-        self._fill(matrix, closing)
-        return matrix
-
-    def _fill(self, matrix: np.ndarray, closing: float) -> None:
-        """Write the derivatives to the unknowns, block by block, into the first columns of a matrix of zeros."""
-        n, d, _ = self.here.shape
-        width = matrix.shape[1]
-        flat, step = matrix.reshape(-1), d * (width + 1)
-        for i in range(d):
-            for j in range(d):
-                flat[i * width + j :: step][:n] = self.here[:, i, j]
-                flat[i * width + j + d :: step][: n - 1] = self.there[:-1, i, j]
-        matrix[-d:, :d] += closing * self.there[-1]
-
-    @cached_property
-    def _all(self) -> np.ndarray:
-        size, count = self.parameters.shape
-        matrix = np.zeros((size, size + count))
-        self._fill(matrix, 1.0)
-        matrix[:, size:] = self.parameters
-        return matrix
-
-    def derivatives(self) -> np.ndarray:
-        """The derivatives to the unknowns and the parameters."""
-        return self._all
-
-    def monodromy(self) -> np.ndarray:
-        """The product of the segments' maps: from the first unknowns to those a (half) period later; inf at a grazing."""
-        chain = np.eye(self.here.shape[1])
-        with np.errstate(all="ignore"):
-            try:
-                maps = -np.linalg.solve(self.there, self.here)
-            except np.linalg.LinAlgError:
-                return np.full_like(chain, np.inf)
-            for segment in maps:
-                chain = segment @ chain
-        return chain
+from saltus.orbits.tolerances import TOLERANCES
+from saltus.systems import System
+from saltus.taylor import FREQUENCY
 
 
 class Segments(NamedTuple):
@@ -115,38 +53,35 @@ class FollowedSegments(NamedTuple):
     rates: np.ndarray  # the sign of the gap's derivative to the coordinate, on each side
 
 
-class OneContactEquations:
-    """The equations of one signature of a system, as functions of the unknowns and of the parameters at `paths`."""
+class OneContactEquations(OrbitEquations):
+    """The equations from impact to impact of a system with one contact, or without contacts."""
 
-    stray: float = math.inf  # see `EquationCurve`
-    rounded: float = 0.0  # the largest residual that rounding may leave; above 0 for problems with very large multipliers
+    @classmethod
+    def solves(cls, system: System, signature: Signature) -> bool:
+        return signature.section is None and not system.model.holds_coordinates
 
-    def __init__(self, system: System, signature: Signature, paths: tuple[str, ...] = (), tol: float = ORBIT_TOLERANCE) -> None:
-        if system.load.frequency is None:
-            raise ParameterError(
-                "a load without a frequency has no forcing period, so no periodic orbits to find; give one", "load.frequency"
-            )
-        self.system, self.signature, self.paths, self.tol = system, signature, paths, tol
-        self._run = _ready(system, paths)
-        if self._run.trace.records:
-            raise ParameterError(
-                "a load with a Record or a pulse is not periodic, so it has no periodic orbits; use Harmonic signals"
-            )
-        names = [path for path, _ in numbers(system)]
-        self._values = np.array([value for _, value in numbers(system)])
-        self._places = [names.index(path) for path in paths]
-        self._frequency = names.index(FREQUENCY)
-        self._where = np.zeros(len(Where), dtype=np.int64)
-        self._where[Where.ORDER] = taylor_order(tol)
-        self._where[STRUCTURE_SIZES] = self._run.structure.sizes
-        self._settings, self._records = np.array([0.0, 0.0, tol]), record_table(system, [])
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle and copy the arguments only: compiled code is loaded again in the process that reads them."""
-        return type(self), (self.system, self.signature, self.paths, self.tol)
+    @classmethod
+    def read(cls, base: OrbitEquations, motion: MotionToRead) -> tuple[OrbitEquations, np.ndarray] | None:
+        if not cls.solves(base.system, base.signature):
+            return None
+        once, periods = motion.once, motion.periods
+        if once.side == 0 or len(once.events.of(EventKind.REST)) or not once.phase_known:
+            return None
+        if base.passes_contact:
+            return base.with_signature(Signature((), periods)), state_vector(base.system, motion.state)
+        impacts = once.impacts
+        # with two sides the number of impacts is even: an impact near the section may have been counted twice, or not at all
+        count = len(impacts) - (len(impacts) % 2 if len(base.system.model.sides) == 2 else 0)
+        if not count:
+            signature = Signature((), periods, False, once.side)
+            return base.with_signature(signature), state_vector(base.system, motion.state)
+        rate = np.abs(impacts.velocity_before[:count])
+        sides = tuple(int(s) for s in impacts.side[:count])
+        unknowns = np.stack([impacts.time[:count] * base.frequency(base.values), rate], axis=1).ravel()
+        return base.with_signature(Signature(sides, periods)), unknowns
 
     @cached_property
-    def passes_contact(self) -> bool:
+    def passes_contact(self) -> bool:  # type: ignore[override]
         """Whether the contact is no singularity for any values of the parameters at `paths`, so that orbits pass through it."""
         if self.signature.sides or not self.system.model.has_one_contact:
             return False
@@ -155,90 +90,102 @@ class OneContactEquations:
         return contact_regularity(self._run.trace, tuple(values), self.paths) is ContactRegularity.CONTINUOUS
 
     @property
-    def values(self) -> np.ndarray:
-        """The parameters of the system itself."""
-        return self._values[self._places]
-
-    @property
-    def own(self) -> int:
-        """Degrees of freedom."""
-        return int(self._where[Where.OWN])
-
-    @property
     def size(self) -> int:
-        """The number of unknowns."""
         return 2 * (len(self.signature.sides) or self.own)
 
-    @property
-    def margins(self) -> tuple[str, ...]:
-        """The model's margins, in the order of `extremes`."""
-        return tuple(self._run.limits)
+    def start(self, solution: Solution) -> dict[str, Any]:
+        """Just after the first impact or, without impacts, at phase 0."""
+        system = self.at(solution.values)
+        if not self.signature.sides:
+            return start_at(system, solution.unknowns)
+        model, side, frequency = system.one_contact, self.signature.sides[0], self.frequency(solution.values)
+        phase, speed = solution.unknowns[:2]
+        time = float((phase - 2.0 * math.pi * math.floor(phase / (2.0 * math.pi))) / frequency)
+        _, after = model.reset(time, -model.inward(side) * float(speed), side, system.load, system.impact)
+        return {model.coordinates[0]: float(model.contact), "velocity": float(after), "time": time}
 
-    @cached_property
-    def closing(self) -> float:
-        """The phase that the equations cover."""
-        return 2.0 * math.pi * self.signature.span
-
-    def frequency(self, values: np.ndarray) -> float:
-        """The forcing frequency at the given parameters."""
-        return float(values[self.paths.index(FREQUENCY)] if FREQUENCY in self.paths else self._values[self._frequency])
-
-    def at(self, values: np.ndarray) -> System:
-        """The system with the given parameters.
-
-        Raises
-        ------
-        ParameterError
-            Where it refuses them.
-        """
-        return self.system.with_({path: float(value) for path, value in zip(self.paths, values, strict=True)})
-
-    def with_signature(self, signature: Signature) -> OneContactEquations:
-        """The problem of another signature."""
-        return type(self)(self.system, signature, self.paths, self.tol)
-
-    @cached_property
-    def images(self) -> tuple[int, ...]:
-        """The number of the mirror image of each contact and friction; none where there is no such symmetry."""
-        return contact_images(self.system.model, self.system.impact) or ()
-
-    @cached_property
-    def halved(self) -> OneContactEquations:
-        """The problem of the orbits that are their own images, over half a period: symmetric orbits if the period is odd, else
-        orbits of half the period."""
-        own, odd = self.signature, bool(self.signature.period % 2)
-        period = own.period if odd else own.period // 2
-        sides, events = own.sides[: len(own.sides) // 2], own.events[: len(own.events) // 2]
-        return self.with_signature(replace(own, sides=sides, events=events, period=period, symmetric=odd))
-
-    def impacts(self, unknowns: np.ndarray, evaluation: OrbitEvaluation) -> tuple[np.ndarray, np.ndarray]:
-        """The phases of the impacts, and the speeds at which the gap closes before them."""
+    def impacts(self, solution: Solution) -> tuple[np.ndarray, np.ndarray]:
+        unknowns = solution.unknowns
         return (unknowns[::2], unknowns[1::2]) if self.signature.sides else (np.empty(0), np.empty(0))
 
-    def touching_speed(self, unknowns: np.ndarray, evaluation: OrbitEvaluation) -> float:
-        """The least speed of the impacts at which the map loses its derivative if the speed vanishes; inf without such
-        impacts."""
-        return float(self.impacts(unknowns, evaluation)[1].min(initial=math.inf))
-
-    def pressing(self, unknowns: np.ndarray, evaluation: OrbitEvaluation) -> float:
-        """A quantity that is negative if a contact that the equations take for closed would open; inf without closed contacts."""
-        return math.inf
-
-    def half_way(self, unknowns: np.ndarray, values: np.ndarray, evaluation: OrbitEvaluation) -> np.ndarray | None:
-        """For an orbit without impacts, the difference of its image from itself; None where the motion cannot be followed."""
-        found = self.halved.evaluate(unknowns, values)
-        return None if found is None else found.residual
+    def halves(self, solution: Solution, mirrored: bool) -> np.ndarray | None:
+        signature, unknowns, n = self.signature, solution.unknowns, len(self.signature.sides)
+        odd = signature.period % 2
+        if signature.symmetric or n % 2 or (odd and not mirrored):
+            return None
+        if n == 0:
+            if odd and self.system.model.has_one_contact and not self.passes_contact:
+                return None  # such an orbit stays on one side, and its image on the other one
+            found = self.halved.evaluate(unknowns, solution.values)
+            return None if found is None else np.stack([unknowns, unknowns + found.residual])
+        first, second = signature.sides[: n // 2], signature.sides[n // 2 :]
+        if second != (tuple(-s for s in first) if odd else first):
+            return None
+        both = unknowns.reshape(2, n // 2, 2).copy()
+        both[1, :, 0] -= np.pi * signature.period
+        return np.asarray(both.reshape(2, n))
 
     def repeated(self, unknowns: np.ndarray) -> np.ndarray:
-        """The unknowns of an orbit with impacts that goes round twice in the time that the equations of the doubled orbit
-        cover."""
+        if not self.signature.sides:
+            return unknowns
         later = unknowns.copy()
         later[::2] += self.closing
         return np.concatenate([unknowns, later])
 
     def alternating(self, direction: np.ndarray) -> np.ndarray:
-        """A perturbation of the unknowns as one of the `repeated` unknowns, with the other sign in the second round."""
-        return np.concatenate([direction, -direction])
+        return np.concatenate([direction, -direction]) if self.signature.sides else direction
+
+    def shorter_period(self, solution: Solution, within: float) -> int | None:
+        signature, n = self.signature, len(self.signature.sides)
+        for periods in range(1, signature.period):
+            part = n * periods // signature.period
+            if signature.period % periods or n * periods % signature.period or part == 0 or signature.symmetric:
+                continue
+            pairs = solution.unknowns.reshape(-1, part, 2).copy()
+            pairs[:, :, 0] -= 2.0 * math.pi * periods * np.arange(len(pairs))[:, None]
+            if signature.sides == signature.sides[:part] * len(pairs) and np.ptp(pairs, axis=0).max() < within:
+                return periods
+        return None
+
+    def nearest(self, unknowns: np.ndarray, values: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
+        """Begun at another impact, and shifted by whole forcing periods."""
+        target, signature = other.orbit.signature, self.signature
+        n = len(signature.sides)
+        if (n, signature.period, signature.symmetric) != (len(target.sides), target.period, target.symmetric):
+            return None
+        if n == 0:
+            return unknowns if signature == target else None
+        pairs, best, least = unknowns.reshape(n, 2), None, math.inf
+        goal = other.solution.unknowns.reshape(n, 2)
+        once = [np.array([turn * self.closing, 0.0]) for turn in range(3)]
+        later = np.concatenate([pairs + shift for shift in once])  # the impacts of three (half) periods
+        next_sides = tuple(-side for side in signature.sides) if signature.symmetric else signature.sides
+        sides = signature.sides + next_sides + signature.sides
+        for turn in range(n * (2 if signature.symmetric else 1)):
+            if sides[turn : turn + n] != target.sides:
+                continue
+            rolled = later[turn : turn + n].copy()
+            rolled[:, 0] += 2.0 * math.pi * round((goal[0, 0] - rolled[0, 0]) / (2.0 * math.pi))
+            distance = float(np.abs(rolled - goal).max())
+            if distance < least:
+                best, least = rolled.ravel(), distance
+        return best
+
+    def barrier(self, point: OrbitPoint) -> TestFunction:
+        return GRAZING
+
+    def beyond(self, cut: Cut, points: list[OrbitPoint]) -> OrbitPoint | End:
+        return other_side(cut.point)
+
+    def curve_barrier(self, kind: str, point: Any) -> TestFunction:
+        return curve_test(SpecialKind[f"{kind}_GR"], room)
+
+    def touched(self, special: Zero) -> tuple[Signature, np.ndarray] | None:
+        point = special.point
+        if point.orbit.slowest < TOLERANCES.touch:  # its own signature has the impact, and the gap has a minimum
+            return point.orbit.signature, point.solution.unknowns
+        equations, unknowns = inserted(point)
+        return equations.signature, unknowns
 
     def evaluate(
         self, unknowns: np.ndarray, values: np.ndarray, with_extremes: bool = False, *, later: np.ndarray | None = None
@@ -329,8 +276,3 @@ class OneContactEquations:
         place = self.paths.index(FREQUENCY) if FREQUENCY in self.paths else -1
         load_segments()[1](spans, sign, following, frequency, place, ends, columns, residual, here, there, parameters)
         return OrbitEvaluation(residual.ravel(), here, there, parameters.reshape(2 * n, count), ends, extremes)
-
-
-def _ready(system: System, paths: tuple[str, ...]) -> Any:
-    """The compiled program of a system with derivatives to the parameters at `paths`, and with all of the model's margins."""
-    return program(system, system.model.margin_names(system.load), paths)

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from saltus.flow import EventKind, Motion, Release, SegmentValue, load_releases, peak_near, simulate
-from saltus.orbits.equations.newton import Solution
-from saltus.orbits.equations.one_contact import ORBIT_TOLERANCE, OneContactEquations, OrbitEvaluation, Segments
+from saltus.orbits.equations.contract import ORBIT_TOLERANCE, OrbitEvaluation, Solution
+from saltus.orbits.equations.one_contact import OneContactEquations, Segments
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
 from saltus.orbits.symmetry import is_symmetric, keeps_symmetry

@@ -9,26 +9,48 @@ coordinate.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from saltus.errors import SaltusError
+from saltus.continuation import Bounds, Cut, End, TestFunction, Zero
+from saltus.errors import MotionError, SaltusError
 from saltus.flow import (
     Motion,
     MotionRequest,
     Program,
     SegmentColumn,
     Sensitivities,
+    Stop,
     derivatives_of,
     limits_of,
     program,
     state_rates,
 )
-from saltus.orbits.equations.event_sequence import FollowedEvents, events_of
-from saltus.orbits.equations.one_contact import OneContactEquations, OrbitEvaluation
+from saltus.orbits.branches.beyond_events import (
+    beyond,
+    change_at,
+    events_of,
+    first_step,
+    jump_over,
+    parent_at,
+    refused_beyond,
+    same_events,
+    stalled_at,
+)
+from saltus.orbits.branches.images import nearest
+from saltus.orbits.branches.orbit_curve import STEEPEST, OrbitPoint
+from saltus.orbits.branches.special_point import OrbitEnd
+from saltus.orbits.equations.contract import MotionToRead, OrbitEquations, OrbitEvaluation, Restart, Solution
+from saltus.orbits.equations.event_sequence import EventSequence, sequence_of
+from saltus.orbits.equations.read_events import STAYS, section_of
 from saltus.orbits.equations.sampled_motion import SampledMotion
+from saltus.orbits.finding.starts import start_at
+from saltus.orbits.orbit import PeriodicOrbit
+from saltus.orbits.signature import Signature
 from saltus.systems import System, image_of
 from saltus.taylor import FREQUENCY
 
@@ -38,31 +60,119 @@ CLOSED = 1e-9  # A contact is closed at the section if its gap and the gap's rat
 
 @dataclass(frozen=True)
 class WholeMotionEvaluation(OrbitEvaluation):
-    """The problem at one point, with the events along the motion."""
+    """The equations at one point, with the events along the motion."""
 
-    followed: FollowedEvents | None  # None if extremes were not asked for
+    events: EventSequence | None  # None if extremes were not asked for
     middle: np.ndarray | None  # the state after half of the time; None if extremes were not asked for
 
 
-class WholeMotionEquations(OneContactEquations):
-    """The equations x = Phi(x) of a system with contacts or frictions; for a symmetric orbit x is the mirror image of Phi(x) over
-    half a period."""
+class WholeMotionEquations(OrbitEquations):
+    """The equations x = Phi(x) of a whole motion; for a symmetric orbit x is the mirror image of Phi(x) over half a period."""
 
-    stray = 0.5  # Where the map jumps, the corrector wanders; this is ten times the accepted distance from the predicted point.
-    rounded = 1e-7  # What rounding leaves where multipliers are 1e8 to 1e9, as they become towards some changes of events.
+    # Where the map jumps, the corrector wanders; this is ten times the accepted distance from the predicted point.
+    corrector_radius = 0.5
+    # What rounding leaves where multipliers are 1e8 to 1e9, as they become towards some changes of events.
+    residual_floor = 1e-7
     # The last place at which the equations were evaluated, with the result: they are often asked for again with the extremes.
     _latest: tuple[np.ndarray, tuple[Motion, WholeMotionEvaluation] | None] | None = None
+
+    @classmethod
+    def solves(cls, system: System, signature: Signature) -> bool:
+        return signature.section is not None
+
+    @classmethod
+    def read(cls, base: OrbitEquations, motion: MotionToRead) -> tuple[OrbitEquations, np.ndarray] | None:
+        """With a section chosen along the motion, and the motion's state there."""
+        system, twice, periods = base.system, motion.twice, motion.periods
+        if not system.model.holds_coordinates or twice.limit is not None:
+            return None
+        end = twice.start + motion.duration
+        within = (twice.start < twice.events.times) & (twice.events.times < end)
+        if not within.any() and 0 in twice.sliding.values():
+            raise MotionError("the motion sticks for good, as it may anywhere near, which is no orbit to follow")
+        if twice.stop is Stop.REST and not (len(twice.events) and twice.events[-1].time > 0.5 * (twice.start + twice.time)):
+            raise MotionError(STAYS)
+        phase, state = section_of(twice, base.frequency(base.values), duration=motion.duration)
+        return cls(system, Signature((), periods, section=phase), base.paths, base.tol), state
 
     @property
     def size(self) -> int:
         return 2 * self.own
 
-    def impacts(self, unknowns: np.ndarray, evaluation: OrbitEvaluation) -> tuple[np.ndarray, np.ndarray]:
-        times, speeds = evaluation.ends[:, 0], evaluation.ends[:, 1]
-        return times * self.frequency(self.values), speeds
+    def start(self, solution: Solution) -> dict[str, Any]:
+        """At the section."""
+        system = self.at(solution.values)
+        time = float(self.signature.section or 0.0) / self.frequency(solution.values)
+        return {**start_at(system, self.start_state(solution.unknowns, system)), "time": time}
 
-    def touching_speed(self, unknowns: np.ndarray, evaluation: OrbitEvaluation) -> float:
+    def impacts(self, solution: Solution) -> tuple[np.ndarray, np.ndarray]:
+        times, speeds = solution.evaluation.ends[:, 0], solution.evaluation.ends[:, 1]
+        return times * self.frequency(solution.values), speeds
+
+    def counted_impacts(self, solution: Solution) -> int:
+        return events_of(solution.evaluation).impact_count // (2 if self.signature.symmetric else 1)
+
+    def touching_speed(self, solution: Solution) -> float:
         return math.inf
+
+    def halves(self, solution: Solution, mirrored: bool) -> np.ndarray | None:
+        odd, unknowns = self.signature.period % 2, solution.unknowns
+        if self.signature.symmetric or (odd and not mirrored):
+            return None
+        middle = solution.evaluation.middle
+        if middle is None:
+            found = self.halved.evaluate(unknowns, solution.values)
+            return None if found is None else np.stack([unknowns, unknowns + found.residual])
+        return np.stack([unknowns, image_of(self.system.model, middle) if odd else middle])
+
+    def nearest(self, unknowns: np.ndarray, values: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
+        """At the section of `other`, in the forcing period in which it is nearest to its state."""
+        target = other.orbit.signature
+        if target.section is None or (target.period, target.symmetric) != (self.signature.period, self.signature.symmetric):
+            return None
+        return self.state_at(target.section, unknowns, values, other.solution.unknowns)
+
+    def at_section_of(self, point: OrbitPoint, other: OrbitPoint) -> OrbitPoint:
+        place = None if point.curve.joins(other.curve) else nearest(point, point.place, other)
+        found = None if place is None else other.curve.known(*np.split(place, [other.curve.equations.size]))
+        return point if found is None else other.curve.with_tangent(found, other.tangent) or point
+
+    def at_another_section(self, orbit: PeriodicOrbit) -> PeriodicOrbit | None:
+        phase, state = section_of(orbit.motion(), orbit.frequency)
+        moved = self.with_signature(replace(self.signature, section=phase))
+        return PeriodicOrbit.near(moved, state, orbit.solution.values)
+
+    def barrier(self, point: OrbitPoint) -> TestFunction:
+        return same_events(point)
+
+    def accepts(self, ahead: OrbitPoint, cut: Callable[[], Cut | End | None]) -> bool:
+        """Not where multipliers grow without bound, as they do towards some changes of events: further steps would be rounding.
+        Nor if no change of events leads to the orbits ahead, which then belong to another branch."""
+        return abs(ahead.orbit.multipliers[0]) <= STEEPEST and not isinstance(cut(), End)
+
+    def change(self, zero: Zero, point: OrbitPoint) -> Cut | End:
+        return change_at(zero, point)
+
+    def beyond(self, cut: Cut, points: list[OrbitPoint]) -> OrbitPoint | Restart | End:
+        return beyond(cut, points)
+
+    def born_at(self, cut: Cut, points: list[OrbitPoint]) -> Zero | None:
+        return parent_at(cut, points)
+
+    def also_at(self, cut: Cut, following: OrbitPoint) -> Zero | None:
+        return jump_over(cut, following)
+
+    def first_step(self, point: OrbitPoint, ahead: OrbitPoint) -> float:
+        return first_step(point, ahead)
+
+    def stalled(self, point: OrbitPoint, step: float, points: list[OrbitPoint], bounds: Bounds) -> Cut | End | None:
+        """Events may change there, so that the branch turns round; or the system ends."""
+        found = refused_beyond(point, step, bounds) or stalled_at(point, step, points)
+        limit = None if found is not None else point.orbit.motion().limit
+        return found if limit is None else End(OrbitEnd.REFUSED, point.parameter, detail=limit)
+
+    def curve_barrier(self, kind: str, point: Any) -> TestFunction:
+        return same_events(point)
 
     def held(self, state: np.ndarray, system: System) -> dict[int, float]:
         """The state variables that are fixed at the section, up to rounding, with their values: coordinates that contacts hold,
@@ -84,10 +194,6 @@ class WholeMotionEquations(OneContactEquations):
             state[place] = value
         return state
 
-    def within(self, unknowns: np.ndarray, evaluation: OrbitEvaluation, values: np.ndarray) -> tuple[np.ndarray, float]:
-        """The state at the section, and its time."""
-        return self.start_state(unknowns, self.at(values)), float(self.signature.section or 0.0) / self.frequency(values)
-
     def evaluate(
         self, unknowns: np.ndarray, values: np.ndarray, with_extremes: bool = False, *, later: np.ndarray | None = None
     ) -> WholeMotionEvaluation | None:
@@ -101,11 +207,11 @@ class WholeMotionEquations(OneContactEquations):
         if found is None or not with_extremes:
             return None if found is None else found[1]
         motion, evaluation = found
-        if evaluation.followed is None:
+        if evaluation.events is None:
             sampled, half = SampledMotion.of(motion), motion.at(0.5 * (motion.start + motion.time))
-            events = events_of(motion, sampled, self.images if self.signature.symmetric else None)
+            events = sequence_of(motion, sampled, self.images if self.signature.symmetric else None)
             middle, extremes = np.concatenate([np.atleast_1d(part) for part in half]), self._extremes(sampled)
-            evaluation = replace(evaluation, extremes=extremes, followed=events, middle=middle)
+            evaluation = replace(evaluation, extremes=extremes, events=events, middle=middle)
             self._latest = place, (motion, evaluation)
         return evaluation
 
@@ -134,13 +240,6 @@ class WholeMotionEquations(OneContactEquations):
         here, there = state[None], -np.eye(len(after))[None]
         residual, impacts = after - unknowns, self._impacts(motion)
         return motion, WholeMotionEvaluation(residual, here, there, parameters, impacts, self._extremes(None), None, None)
-
-    def half_way(self, unknowns: np.ndarray, values: np.ndarray, evaluation: OrbitEvaluation) -> np.ndarray | None:
-        assert isinstance(evaluation, WholeMotionEvaluation)
-        if evaluation.middle is None:
-            return super().half_way(unknowns, values, evaluation)
-        middle = evaluation.middle
-        return np.asarray((image_of(self.system.model, middle) if self.signature.period % 2 else middle) - unknowns)
 
     def state_at(self, phase: float, unknowns: np.ndarray, values: np.ndarray, near: np.ndarray) -> np.ndarray | None:
         """The state of the orbit at a phase of the load: of one such state in each forcing period, the nearest to the state

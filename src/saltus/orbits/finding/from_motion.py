@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,6 @@ from saltus.checks import check_count, check_names, check_path
 from saltus.errors import MotionError, ParameterError, near, shown
 from saltus.flow import (
     RECURRENCE,
-    EventKind,
     Motion,
     load_releases,
     nearest_return,
@@ -20,14 +19,14 @@ from saltus.flow import (
     return_period,
     simulate,
 )
-from saltus.orbits.equations.contacts import ContactsEquations, equations_of
-from saltus.orbits.equations.one_contact import OneContactEquations
+from saltus.orbits.branches.images import divide, half
+from saltus.orbits.equations.contract import MotionToRead, OrbitEquations
+from saltus.orbits.equations.kinds import KINDS, equations_of
 from saltus.orbits.equations.resting import resting_near
-from saltus.orbits.finding.contact_signature import solved_from
+from saltus.orbits.finding.starts import start_at, state_vector
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
-from saltus.orbits.symmetry import half, is_symmetric, keeps_symmetry
-from saltus.orbits.tolerances import TOLERANCES
+from saltus.orbits.symmetry import is_symmetric, keeps_symmetry
 from saltus.public_functions import Numbers
 from saltus.systems import System, check_system
 
@@ -127,7 +126,7 @@ def _after(system: System, state: dict[str, Any], periods: int) -> dict[str, Any
     """The state `periods` forcing periods later."""
     motion = simulate(system, **state, periods=periods, dense=False)
     _refuse_rest(system, motion, state)
-    return _state_of(system, motion)
+    return start_at(system, np.append(motion.position, motion.velocity))
 
 
 def _refuse_rest(system: System, motion: Motion, state: dict[str, Any]) -> None:
@@ -157,20 +156,12 @@ def _refuse_rest(system: System, motion: Motion, state: dict[str, Any]) -> None:
         )
 
 
-def _state_of(system: System, motion: Motion) -> dict[str, Any]:
-    return {**dict(zip(system.model.coordinates, np.atleast_1d(motion.position), strict=True)), "velocity": motion.velocity}
-
-
-def _vector(system: System, state: dict[str, Any]) -> np.ndarray:
-    return np.concatenate([[state[name] for name in system.model.coordinates], np.atleast_1d(state["velocity"])])
-
-
 def _stroboscopic_states(system: System, state: dict[str, Any], count: int) -> np.ndarray:
     """The states after 0, 1, ..., count forcing periods."""
-    states = [_vector(system, state)]
+    states = [state_vector(system, state)]
     for _ in range(count):
         state = _after(system, state, 1)
-        states.append(_vector(system, state))
+        states.append(state_vector(system, state))
     return np.array(states)
 
 
@@ -189,7 +180,7 @@ def _period_of(system: System, state: dict[str, Any], period: int | None, max_pe
     return nearest_return(_stroboscopic_states(system, state, max_period)[::-1], max_period)
 
 
-def _polish(base: OneContactEquations, state: dict[str, Any], periods: int, passed: int | None) -> PeriodicOrbit:
+def _polish(base: OrbitEquations, state: dict[str, Any], periods: int, passed: int | None) -> PeriodicOrbit:
     """Solve for the orbit near a motion over one of its periods."""
     orbit = orbit_from(base, state, periods)
     if orbit is not None and orbit.admissible:
@@ -201,42 +192,33 @@ def _polish(base: OneContactEquations, state: dict[str, Any], periods: int, pass
     )
 
 
-def orbit_from(base: OneContactEquations, state: dict[str, Any], periods: int) -> PeriodicOrbit | None:
+def orbit_from(base: OrbitEquations, state: dict[str, Any], periods: int) -> PeriodicOrbit | None:
     """The orbit near a motion over `periods` forcing periods from a state at phase 0; it may be one that rests for a part of
-    them."""
+    them.
+
+    Raises
+    ------
+    MotionError
+        The motion leads to no orbit.
+    """
     orbit = orbit_near(base, state, periods)
     if (orbit is not None and orbit.admissible) or base.system.model.holds_coordinates:
         return orbit
     return resting_near(base, simulate(base.system, **state, periods=periods, dense=False), periods) or orbit
 
 
-def orbit_near(base: OneContactEquations, state: dict[str, Any], periods: int) -> PeriodicOrbit | None:
-    """The orbit with the signature of a motion over `periods` forcing periods from a state at phase 0, by Newton's method."""
-    system = base.system
-    if isinstance(base, ContactsEquations):
-        solved = solved_from(base, state, periods, SETTINGS.iterations)
-        return None if solved is None else (half(solved) if _is_symmetric(solved.equations) else None) or solved
-    motion = simulate(system, **state, periods=periods)
-    if motion.side == 0 or len(motion.events.of(EventKind.REST)) or not motion.phase_known:
-        return None
-    equations, unknowns = guess(base, motion, _vector(system, state), periods)
-    found = PeriodicOrbit.near(equations, unknowns, equations.values, iterations=SETTINGS.iterations)
-    return None if found is None else simplest(found)
-
-
-def guess(base: OneContactEquations, motion: Motion, state: np.ndarray, periods: int) -> tuple[OneContactEquations, np.ndarray]:
-    """The problem with a motion's signature, and its unknowns along the motion."""
-    if base.passes_contact:
-        return base.with_signature(Signature((), periods)), state
-    impacts = motion.impacts
-    # with two sides the number of impacts is even: an impact near the section may have been counted twice, or not at all
-    count = len(impacts) - (len(impacts) % 2 if len(base.system.model.sides) == 2 else 0)
-    if not count:
-        return base.with_signature(Signature((), periods, False, motion.side)), state
-    rate = np.abs(impacts.velocity_before[:count])
-    sides = tuple(int(s) for s in impacts.side[:count])
-    unknowns = np.stack([impacts.time[:count] * base.frequency(base.values), rate], axis=1).ravel()
-    return base.with_signature(Signature(sides, periods)), unknowns
+def orbit_near(base: OrbitEquations, state: dict[str, Any], periods: int) -> PeriodicOrbit | None:
+    """The orbit with the signature of a motion over `periods` forcing periods from a state at phase 0, by Newton's method: the
+    first that is admissible of those of all kinds of equations."""
+    motion, orbit = MotionToRead(base.system, state, periods), None
+    for kind in KINDS:
+        read = kind.read(base, motion)
+        found = None if read is None else PeriodicOrbit.near(*read, base.values, iterations=SETTINGS.iterations)
+        if found is not None:
+            orbit = simplest(found)
+        if orbit is not None and orbit.admissible:
+            break
+    return orbit
 
 
 def simplest(orbit: PeriodicOrbit) -> PeriodicOrbit:
@@ -245,25 +227,7 @@ def simplest(orbit: PeriodicOrbit) -> PeriodicOrbit:
     return (half(orbit) if _is_symmetric(orbit.equations) else None) or orbit
 
 
-def _is_symmetric(equations: OneContactEquations) -> bool:
-    """Whether a system has the mirror symmetry, for all parameters at the problem's paths."""
-    return keeps_symmetry(equations.system, equations.paths[0]) if equations.paths else is_symmetric(equations.system)
-
-
-def divide(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
-    """An orbit that repeats after a divisor of its period, as an orbit of this shorter period; None for other orbits."""
-    signature, unknowns = orbit.signature, orbit.solution.unknowns
-    changes = signature.sides or signature.events
-    n = len(changes)
-    for q in range(1, signature.period):
-        if signature.period % q or (n * q) % signature.period:
-            continue
-        part = n * q // signature.period
-        if changes and (part == 0 or changes[:part] != changes[part : 2 * part]):
-            continue
-        short = replace(signature, sides=signature.sides[:part], events=signature.events[:part], period=q, symmetric=False)
-        shorter = orbit.equations.with_signature(short)
-        found = PeriodicOrbit.near(shorter, unknowns[: shorter.size], orbit.solution.values)
-        if found is not None and np.abs(found.solution.unknowns - unknowns[: shorter.size]).max() < TOLERANCES.halves:
-            return found
-    return None
+def _is_symmetric(equations: OrbitEquations) -> bool:
+    """Whether a system has the mirror symmetry, for all parameters at the equations' paths."""
+    paths = equations.paths
+    return keeps_symmetry(equations.system, paths[0]) if paths else is_symmetric(equations.system)

@@ -13,7 +13,7 @@ import numpy as np
 
 from saltus.errors import MotionError
 from saltus.flow import RECURRENCE, last_states, motions_from
-from saltus.orbits.equations.contacts import equations_of
+from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.finding.from_motion import orbit_from
 from saltus.orbits.finding.starts import held_by_contacts, start_at, states_beside
 from saltus.orbits.orbit import PeriodicOrbit

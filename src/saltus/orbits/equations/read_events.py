@@ -1,4 +1,4 @@
-"""The signature of a motion with several contacts, and the orbit that has this signature."""
+"""What equations read from a motion: the signature of its events, and a section at which its state is given."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import MotionError
-from saltus.flow import EventKind, Motion, Stop, modes_of, simulate
-from saltus.orbits.equations.contacts import ContactsEquations, equations_of
-from saltus.orbits.equations.one_contact import OneContactEquations
-from saltus.orbits.orbit import PeriodicOrbit
+from saltus.flow import EventKind, Motion, modes_of
 from saltus.orbits.signature import ModeChange, Signature
+
+STAYS = "the motion comes to rest with all coordinates held at contacts for good, which is no orbit to follow"
 
 
 @dataclass(frozen=True)
@@ -21,47 +20,9 @@ class ReadingSettings:
     """How a signature is read from the events of a motion."""
 
     together: float = 1e-9  # Events nearer to each other than this share of a forcing period happen at one instant.
-    tol: float = 1e-13  # Tolerance of the motion that is read: Newton's method begins from it.
 
 
 SETTINGS = ReadingSettings()
-
-
-def solved_from(base: OneContactEquations, state: dict[str, Any], periods: int, iterations: int) -> PeriodicOrbit | None:
-    """The orbit with the signature of a motion over `periods` forcing periods from a state, by Newton's method.
-
-    Raises
-    ------
-    MotionError
-        The motion stays at its contacts for good, or has events for which orbits have no equations yet.
-    """
-    motion = simulate(base.system, **state, periods=2 * periods, tol=SETTINGS.tol)
-    if motion.limit is not None:
-        return None
-    followed = _is_followed(base, motion)
-    equations, unknowns = _followed(base, motion, periods) if followed else read_signature(base, motion, periods)
-    later = motion.events and motion.events[-1].time > 0.5 * (motion.start + motion.time)
-    if not equations.size or (followed and motion.stop is Stop.REST and not later):
-        raise MotionError("the motion comes to rest with all coordinates held at contacts for good, which is no orbit to follow")
-    return PeriodicOrbit.near(equations, unknowns, equations.values, iterations=iterations)
-
-
-def _is_followed(base: OneContactEquations, motion: Motion) -> bool:
-    """Whether the orbit is followed through its events, because there are no equations from event to event for it: with
-    frictions, or with accumulations of impacts."""
-    return bool(base.system.model.frictions) or len(motion.events.of(EventKind.HELD)) > 0
-
-
-def _followed(base: OneContactEquations, motion: Motion, periods: int) -> tuple[OneContactEquations, np.ndarray]:
-    """The problem x = Phi(x) over `periods` forcing periods, with a section chosen along a motion, and the motion's state
-    there."""
-    period = base.system.load.period
-    assert period is not None
-    within = (motion.start < motion.events.times) & (motion.events.times < motion.start + periods * period)
-    if not within.any() and 0 in motion.sliding.values():
-        raise MotionError("the motion sticks for good, as it may anywhere near, which is no orbit to follow")
-    phase, state = section_of(motion, base.frequency(base.values), duration=periods * period)
-    return equations_of(base.system, Signature((), periods, section=phase), base.paths, base.tol), state
 
 
 def section_of(
@@ -87,14 +48,14 @@ def section_of(
     return time * frequency % (2.0 * np.pi), state
 
 
-def read_signature(base: OneContactEquations, motion: Motion, periods: int) -> tuple[ContactsEquations, np.ndarray]:
-    """The problem with the signature of a motion, and its unknowns along the motion, which was followed for twice `periods`.
+def read_signature(motion: Motion, periods: int, frequency: float) -> tuple[Signature, np.ndarray, np.ndarray]:
+    """The signature of a motion that was followed for twice `periods`, the state after its first event, and the events' phases.
 
     The events are those of a span of `periods` forcing periods that begins in the middle between two events.
     """
-    period = base.system.load.period
+    period = motion.system.load.period
     assert period is not None
-    changes = _mode_changes(base, motion, SETTINGS.together * period)
+    changes = _mode_changes(motion, SETTINGS.together * period)
     times = np.array([time for time, _ in changes])
     start, length = motion.start, periods * period
     bounds = np.concatenate([[start], times[times < start + length], [start + length]])
@@ -103,16 +64,12 @@ def read_signature(base: OneContactEquations, motion: Motion, periods: int) -> t
     chosen = [(time, change) for time, change in changes if begin <= time < begin + length]
     events = tuple(change for _, change in chosen)
     signature = Signature((), periods, events=events, closed=0 if events else motion.side - 1)
-    equations = base.with_signature(signature)
-    assert isinstance(equations, ContactsEquations)
-    first = chosen[0][0] if chosen else motion.start
-    position, velocity = motion.at(first)
+    position, velocity = motion.at(chosen[0][0] if chosen else motion.start)
     after = np.append(np.atleast_1d(position), np.atleast_1d(velocity))
-    phases = np.array([time for time, _ in chosen]) * base.frequency(base.values)
-    return equations, equations.joined(after, phases)
+    return signature, after, np.array([time for time, _ in chosen]) * frequency
 
 
-def _mode_changes(base: OneContactEquations, motion: Motion, together: float) -> list[tuple[float, ModeChange]]:
+def _mode_changes(motion: Motion, together: float) -> list[tuple[float, ModeChange]]:
     """The events at which contacts open or close, each with its time and the contacts that are closed after it.
 
     Contacts of different groups, such as the cells of a chain that move alike, may act at one instant. These count as events one
@@ -124,7 +81,7 @@ def _mode_changes(base: OneContactEquations, motion: Motion, together: float) ->
         There are events for which orbits have no equations.
     """
     changes: list[tuple[float, ModeChange]] = []
-    for time, acting in _instants(base, motion, together):
+    for time, acting in _instants(motion, together):
         closed = int(motion.closed_at(time))
         for contact, is_impact in acting.items():  # before the first of these events all their contacts are as they were
             closed = closed & ~(1 << contact) if is_impact else closed | 1 << contact
@@ -135,9 +92,9 @@ def _mode_changes(base: OneContactEquations, motion: Motion, together: float) ->
     return changes
 
 
-def _instants(base: OneContactEquations, motion: Motion, together: float) -> list[tuple[float, dict[int, bool]]]:
+def _instants(motion: Motion, together: float) -> list[tuple[float, dict[int, bool]]]:
     """The instants at which contacts act: for each of them the contacts, and whether it is an impact (else a release)."""
-    contacts = base.system.model.contacts
+    contacts = motion.system.model.contacts
     names, instants = [contact.name for contact in contacts], list[tuple[float, dict[int, bool]]]()
     events: Sequence[Any] = motion.events
     for event in events:

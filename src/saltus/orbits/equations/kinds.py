@@ -1,0 +1,20 @@
+"""The kinds of equations of orbits, and the equations of a signature."""
+
+from __future__ import annotations
+
+from saltus.orbits.equations.contacts import ContactsEquations
+from saltus.orbits.equations.contract import ORBIT_TOLERANCE, OrbitEquations
+from saltus.orbits.equations.one_contact import OneContactEquations
+from saltus.orbits.equations.whole_motion import WholeMotionEquations
+from saltus.orbits.signature import Signature
+from saltus.systems import System
+
+# The kinds, in the order in which a motion is read with them: the first admissible orbit is taken.
+KINDS: list[type[OrbitEquations]] = [OneContactEquations, ContactsEquations, WholeMotionEquations]
+
+
+def equations_of(
+    system: System, signature: Signature, paths: tuple[str, ...] = (), tol: float = ORBIT_TOLERANCE
+) -> OrbitEquations:
+    """The equations of the orbits of a signature, along the parameters at `paths`."""
+    return next(kind for kind in KINDS if kind.solves(system, signature))(system, signature, paths, tol)
