@@ -43,11 +43,12 @@ END_OF_FILE = {0: 40, 1: 44, 2: 28, 3: 28}  # where HDF5's superblock holds the 
 # --- writing ---------------------------------------------------------------------------------------------------------------
 
 
-def write_durably(path: Path, content: bytes) -> None:
+def write_durably(path: Path, content: bytes, flush: bool = True) -> None:
     """Write a file so that it is either complete or not there, also after a kill or a power failure.
 
     It is written to a file beside its place, brought to the disk, and moved there; its folder is made as needed. If this fails or
-    is interrupted, `path` is as it was before and nothing is left beside it.
+    is interrupted, `path` is as it was before and nothing is left beside it. Without `flush` the disk is not waited for, which
+    takes some milliseconds: after a power failure the file may then lack its content, which its checksum tells.
 
     Raises
     ------
@@ -61,7 +62,8 @@ def write_durably(path: Path, content: bytes) -> None:
             lock(file)  # tells `sweep_up` that the file is still being written
             file.write(content)
             file.flush()
-            os.fsync(file.fileno())
+            if flush:
+                os.fsync(file.fileno())
             os.replace(part, path)
     except BaseException as error:  # KeyboardInterrupt too
         with contextlib.suppress(OSError):
@@ -88,8 +90,12 @@ def write_dataset(path: Path | str, dataset: Any) -> Path:
     """Write an xarray Dataset or DataTree to `path` as `write_bytes` does, as netCDF with a checksum at its end."""
     buffer = io.BytesIO()
     dataset.to_netcdf(buffer, engine="h5netcdf")
-    content = buffer.getvalue()
-    return write_bytes(path, content + HEAD + _digest(content) + TAIL)
+    return write_bytes(path, sealed(buffer.getvalue()))
+
+
+def sealed(content: bytes) -> bytes:
+    """Bytes with their checksum behind them, as `checked_content` reads them."""
+    return content + HEAD + _digest(content) + TAIL
 
 
 def write_figure(stem: Path | str, figure: Any, title: str | None = None) -> list[Path]:

@@ -14,7 +14,7 @@ import tomli_w
 from saltus.errors import SaltusError
 from saltus.files import read_dataset, write_dataset
 from saltus.studies import response_spectrum
-from saltus.sweep import open_store, parts_of, status
+from saltus.sweep import open_store, status
 from saltus.systems import System
 
 SYSTEM = {name: bad_inputs.STUDY[name] for name in ("model", "load")}
@@ -71,8 +71,7 @@ def content_of(kind, folder, home):
         return read_dataset(home)
     if kind == "study":
         return asked_again(folder)
-    found = (status(home, verify=True), *parts_of(home, verify=True))
-    if any(each.damaged for each in found):
+    if status(home, verify=True).damaged:
         raise SaltusError("status --verify names it")
     return open_store(home).load()
 

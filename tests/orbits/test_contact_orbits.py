@@ -7,7 +7,7 @@ import pytest
 
 import saltus
 from saltus.errors import MotionError, ParameterError
-from saltus.orbits import OrbitEnd, SpecialKind, as_bytes, defects, from_bytes, orbits_of
+from saltus.orbits import OrbitEnd, SpecialKind, as_json, defects, from_json, orbits_of
 from saltus.systems import (
     Harmonic,
     Load,
@@ -206,10 +206,10 @@ def test_a_branch_ends_where_one_layer_is_at_its_contact_as_the_other_one_closes
     assert max(orbit.defect for orbit in branch.orbits) < 1e-11
 
 
-def test_an_orbit_survives_bytes():
+def test_an_orbit_survives_a_store():
     """As a store of a diagram keeps it: the equations read back are those of several contacts, with equal solutions."""
     orbit = saltus.find_orbit(layers(H=0.2), theta_1=0.1, theta_2=0.0)
-    again = from_bytes(as_bytes(orbit))
+    again = from_json(as_json(orbit))
     np.testing.assert_array_equal(again.solution.unknowns, orbit.solution.unknowns)
     np.testing.assert_array_equal(again.multipliers, orbit.multipliers)
     assert again.signature == orbit.signature

@@ -9,7 +9,7 @@ import numpy as np
 from shared_systems import forced
 
 from saltus.studies import bifurcation_diagram, response_spectrum
-from saltus.sweep.store import Store
+from saltus.sweep.memo import Memo
 from saltus.systems import Harmonic, Load, NewtonImpact, System, TwoStops
 
 FREQUENCY, BOUNDS = "load.frequency", (1.3, 1.6)  # two motions, their cascades and chaos
@@ -35,18 +35,18 @@ DIAGRAMS = {"one": diagram, "several": contact_diagram}  # by how many contacts 
 
 
 def killed_at(count):
-    """Kill this process when it writes so many chunks of stores: before some, after the others, as the number is even or odd."""
-    write, written = Store.write, []
+    """Kill this process when it writes so many chunks of its memo: before some, after others, as the number is even or odd."""
+    write, written = Memo._write, []
 
-    def struck(self, index, values):
-        written.append(index)
+    def struck(self, name, *found):
+        written.append(name)
         if len(written) == count and count % 2 == 0:
             os.kill(os.getpid(), signal.SIGKILL)
-        write(self, index, values)
+        write(self, name, *found)
         if len(written) == count:
             os.kill(os.getpid(), signal.SIGKILL)
 
-    Store.write = struck
+    Memo._write = struck
 
 
 if __name__ == "__main__":

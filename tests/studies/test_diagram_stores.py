@@ -19,13 +19,13 @@ from typer.testing import CliRunner
 from saltus import provenance
 from saltus.cli.app import app
 from saltus.errors import ParameterError, SweepError
-from saltus.files import write_dataset
+from saltus.files import checked_content, write_dataset
 from saltus.flow import Ending
 from saltus.provenance import identity
 from saltus.studies import response_spectrum
 from saltus.studies.diagram import diagram_work
 from saltus.studies.diagram.effort import EFFORTS, Effort
-from saltus.sweep import Parts, SweepInterrupted, parts, parts_of, status
+from saltus.sweep import Memo, SweepInterrupted, memo, status, unpacked
 
 SCRIPT = Path(__file__).with_name("diagram_script.py")
 
@@ -54,8 +54,9 @@ def files(folder):
 def counts(store):
     """How many inputs were computed of each kind of parts."""
     found = {}
-    for part in parts_of(store):
-        found[part.kind] = found.get(part.kind, 0) + part.sizes["row"]
+    for file in (store / "parts").iterdir():
+        part = unpacked(checked_content(file))
+        found[part["kind"]] = found.get(part["kind"], 0) + len(part["inputs"])
     return found
 
 
@@ -63,7 +64,7 @@ def test_a_store_changes_no_number_and_remembers_all_of_them(alone, kept, monkey
     store = kept / "diagram.zarr"
     assert status(store).complete
     assert min(counts(store)[kind] for kind in ("motions", "branches", "judgements", "distances")) > 0
-    monkeypatch.setattr(parts, "run", None)  # nothing is left to compute
+    monkeypatch.setattr(memo, "outcomes", None)  # nothing is left to compute
     xr.testing.assert_identical(diagram(store=store), alone)
 
 
@@ -84,7 +85,7 @@ def test_what_an_effort_does_not_follow_in_windows_of_chaos_is_listed_with_its_r
 
 
 def test_killed_at_several_moments_a_search_goes_on_to_the_same_bytes(kept, tmp_path):
-    chunks = sum(part.total for part in parts_of(kept / "diagram.zarr"))
+    chunks = sum(status(kept / "diagram.zarr").remembered.values())
     for count in (6, chunks // 3 | 1):
         kill("one", tmp_path / "diagram.zarr", count)
     assert files(computed(tmp_path)) == files(kept)
@@ -99,7 +100,7 @@ def test_killed_and_interrupted_a_search_with_several_contacts_goes_on_to_the_sa
     for folder in (whole, again):
         folder.mkdir()
     write_dataset(whole / "diagram.nc", contact_diagram(store=whole / "diagram.zarr"))
-    chunks = sum(part.total for part in parts_of(whole / "diagram.zarr"))
+    chunks = sum(status(whole / "diagram.zarr").remembered.values())
     with pytest.raises(SweepInterrupted, match="keeps its parts"):
         contact_diagram(store=again / "diagram.zarr", progress=stop)
     kill("several", again / "diagram.zarr", 1 + chunks // 3)
@@ -117,7 +118,7 @@ def kill(kind, store, count):
 
 
 def test_one_and_two_processes_give_the_same_bytes(alone, kept, tmp_path, monkeypatch):
-    monkeypatch.setattr(parts, "SETTINGS", parts.PartsSettings(patience=0.0))
+    monkeypatch.setattr(memo, "PATIENCE", 0.0)
     assert files(computed(tmp_path, workers=2)) == files(kept)
     xr.testing.assert_identical(diagram(store=tmp_path / "diagram.zarr", workers=2), alone)
 
@@ -156,15 +157,15 @@ def test_a_motion_that_has_settled_is_the_same_however_long_it_is_given():
     system, values = forced(2.0), np.array([1.3, 1.35, 1.45, 1.6])
     states = np.array([[0.3, 0.0], [1.0, 0.2], [0.3, 0.0], [-1.0, 0.0]])
     common = {"system": system.to_json(), "path": FREQUENCY, **identity(system)}
-    work, direct = (diagram_work.DiagramWork(system, FREQUENCY, made) for made in (Parts(common), None))
+    work, direct = (diagram_work.DiagramWork(system, FREQUENCY, made) for made in (Memo(common), None))
     work.simulate(values, states, 200)
-    rows = [(given[3], row[1]) for given, row in work.parts.remembered(diagram_work._parts(2)["motions"])]
+    rows = [(given[3], one["outcome"]) for given, one in work.memo.remembered(diagram_work.kinds()["motions"])]
     moving = sum(outcome == Ending.UNDECIDED for time, outcome in rows if time == 200)
     assert 0 < moving < len(values)
     longer, fresh = work.simulate(values, states, 400), direct.simulate(values, states, 400)
     for field in fields(fresh):
         np.testing.assert_array_equal(getattr(longer, field.name), getattr(fresh, field.name))
-    assert sum(given[3] == 400 for given, _ in work.parts.remembered(diagram_work._parts(2)["motions"])) == moving
+    assert sum(given[3] == 400 for given, _ in work.memo.remembered(diagram_work.kinds()["motions"])) == moving
 
 
 @pytest.mark.parametrize(
@@ -214,10 +215,10 @@ def test_status_counts_the_parts_and_verifies_them(kept, tmp_path):
     told = CliRunner().invoke(app, ["status", "--verify", str(store)])
     assert told.exit_code == 0, told.output
     for kind in counts(store):
-        assert re.search(rf"{kind} +(\d+ parts, )?\d+ of \d+ chunks done", told.output)
+        assert re.search(rf"{kind} +\d+ chunks? remembered", told.output)
     assert "The sweep is complete" in told.output
-    chunk = next(store.glob("parts/branches_*/result/c/0/0"))
-    chunk.write_bytes(chunk.read_bytes()[:-1] + b"\0")
+    chunk = next(store.glob("parts/branches_*"))
+    chunk.write_bytes(chunk.read_bytes()[:99] + chunk.read_bytes()[100:])
     told = CliRunner().invoke(app, ["status", "--verify", str(store)])
     assert told.exit_code == 2
     assert "1 damaged or missing file" in told.output
@@ -225,6 +226,6 @@ def test_status_counts_the_parts_and_verifies_them(kept, tmp_path):
 
 def test_a_damaged_part_is_computed_again(kept, tmp_path):
     shutil.copytree(kept, tmp_path / "again")
-    chunk = next((tmp_path / "again").glob("diagram.zarr/parts/motions_*/result/c/0/0"))
-    chunk.write_bytes(chunk.read_bytes()[:-1] + b"\0")
+    chunk = next((tmp_path / "again").glob("diagram.zarr/parts/motions_*"))
+    chunk.write_bytes(chunk.read_bytes()[:99] + chunk.read_bytes()[100:])
     assert files(computed(tmp_path / "again")) == files(kept)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,13 +33,12 @@ def print_status(path: Path, verify: bool = False) -> None:
     ParameterError
         There is no store of a sweep at `path`, or what was verified is damaged.
     """
-    from saltus.sweep import damage, parts_of, status
+    from saltus.sweep import damage, status
 
     if verify and not (path / "zarr.json").is_file() and (path.suffix != ".zarr" or not path.exists()):
         print_verified(path)
         return
     found = status(path, verify=verify)
-    further = list(parts_of(path, verify))
     console = Console(highlight=False)
     kind = printable(found.kind, LONGEST_KIND)
     console.print(Text(f"{kind[:1].upper()}{kind[1:].replace('_', ' ')} ", style="bold"), end="")
@@ -49,12 +48,11 @@ def print_status(path: Path, verify: bool = False) -> None:
     table = Table(box=None, show_header=False, pad_edge=False)
     table.add_column(style="dim", no_wrap=True)
     table.add_column(overflow="fold")
-    for head, text in (*rows(found), *parts(further)):
+    for head, text in rows(found):
         table.add_row(head, Text(printable(text)))
     console.print(table)
-    damaged = next((each for each in (found, *further) if each.damaged), None)
-    if damaged is not None:
-        raise ParameterError(f"{damage(damaged)}; start the sweep again, and what they held is computed anew")
+    if found.damaged:
+        raise ParameterError(f"{damage(found)}; start the sweep again, and what they held is computed anew")
     console.print(ending(found), markup=False, soft_wrap=True)
     if verify:
         console.print("Every file is what was written.", markup=False)
@@ -69,7 +67,7 @@ def print_verified(path: Path) -> None:
         Damaged results, all of which the error names; or no result at `path`.
     """
     from saltus.files import UNCHECKED, checked_content, has_checksum
-    from saltus.sweep import damage, parts_of, status
+    from saltus.sweep import damage, status
 
     found = [path] if path.is_file() else [*sorted(path.rglob("*.nc")), *sorted(path.rglob("*.zarr"))]
     console, wrong = Console(highlight=False), list[str]()
@@ -78,8 +76,8 @@ def print_verified(path: Path) -> None:
     for file in found:
         try:
             if file.is_dir():
-                stores = (status(file, verify=True), *parts_of(file, verify=True))
-                said, bad = "sound", next((damage(store) for store in stores if store.damaged), "")
+                store = status(file, verify=True)
+                said, bad = "sound", damage(store) if store.damaged else ""
             else:
                 checked_content(file)
                 said, bad = "sound" if has_checksum(file.read_bytes()) else UNCHECKED, ""
@@ -97,6 +95,8 @@ def rows(found: StoreStatus) -> Iterator[tuple[str, str]]:
     if found.kind != SEARCH:
         yield "chunks", f"{found.done} of {found.total} done ({100 * found.done // found.total} %)"
         yield "grid", ", ".join(f"{size} along {name}" for name, size in found.sizes.items())
+    for kind, count in found.remembered.items():
+        yield kind, f"{count} chunk{'s' * (count > 1)} remembered"
     yield "size", "about " * found.estimated + size(found.bytes)
     yield "begun", moment(found.started)
     yield "last written", moment(found.updated) if found.updated else "nothing yet"
@@ -106,17 +106,6 @@ def rows(found: StoreStatus) -> Iterator[tuple[str, str]]:
         yield "", str(failure)
     if found.failed > FAILURES_NAMED:
         yield "", f"and {found.failed - FAILURES_NAMED} more"
-
-
-def parts(found: Iterable[StoreStatus]) -> Iterator[tuple[str, str]]:
-    """The lines of the parts that are kept within a store, such as the work on the borders of a chart: how many of each kind."""
-    kinds: dict[str, list[StoreStatus]] = {}
-    for part in found:
-        name = part.path.name.split("_")[0]
-        kinds.setdefault(f"{name} of borders" if part.kind == "chart_borders" else name, []).append(part)
-    for kind, own in kinds.items():
-        count = f"{len(own)} parts, " if len(own) > 1 else ""
-        yield kind, f"{count}{sum(part.done for part in own)} of {sum(part.total for part in own)} chunks done"
 
 
 def ending(found: StoreStatus) -> str:

@@ -25,7 +25,7 @@ from .finding.starts import (
 )
 from .free_orbits import FreeOrbit, FreeOutcome, backbone, free_orbit
 from .orbit import PeriodicOrbit, solve
-from .orbits_as_bytes import as_bytes, from_bytes
+from .orbits_as_json import as_json, from_json
 from .signature import Signature
 from .symmetry import is_symmetric, keeps_symmetry
 from .verify import closing_distances, closing_rows, defects, same_orbit
@@ -45,7 +45,7 @@ __all__ = [
     "SpecialCurve",
     "SpecialKind",
     "SpecialPoint",
-    "as_bytes",
+    "as_json",
     "backbone",
     "before_impacts",
     "closing_distances",
@@ -59,7 +59,7 @@ __all__ = [
     "find_orbit",
     "follow_stable",
     "free_orbit",
-    "from_bytes",
+    "from_json",
     "initial_states",
     "is_still",
     "is_symmetric",

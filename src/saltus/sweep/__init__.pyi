@@ -1,7 +1,8 @@
 from .chunk_results import Failure
 from .cluster import on_cluster
 from .execution import SweepInterrupted, check_run, run
-from .parts import Part, Parts, parts_of, text_rows
+from .memo import Memo, MemoKind
+from .memo_files import packed, unpacked
 from .plan import Plan, Variable
 from .store import BEGIN_ANEW, check_store, open_store, opened, remove_store
 from .store_status import StoreStatus, damage, read_plan, status
@@ -10,8 +11,8 @@ from .workers import Workers
 __all__ = [
     "BEGIN_ANEW",
     "Failure",
-    "Part",
-    "Parts",
+    "Memo",
+    "MemoKind",
     "Plan",
     "StoreStatus",
     "SweepInterrupted",
@@ -23,10 +24,10 @@ __all__ = [
     "on_cluster",
     "open_store",
     "opened",
-    "parts_of",
+    "packed",
     "read_plan",
     "remove_store",
     "run",
     "status",
-    "text_rows",
+    "unpacked",
 ]

@@ -7,7 +7,7 @@ import importlib
 import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -18,6 +18,21 @@ if TYPE_CHECKING:
     from saltus.sweep.plan import Plan
 
 Arrays = dict[str, np.ndarray]
+
+
+class Computation(Protocol):
+    """What processes and clusters compute: a function, its arguments, and chunks of what it is called with."""
+
+    @property
+    def function(self) -> str:
+        """ "package.module:name", importable wherever it runs."""
+
+    @property
+    def arguments(self) -> Mapping[str, Any]:
+        """The arguments that are the same for all chunks."""
+
+    def block(self, index: Index, /) -> Any:
+        """What belongs to one chunk."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +74,7 @@ class Raised:
     traceback: str = ""
 
 
-def resolve(function: str) -> Callable[[Any, dict[str, np.ndarray]], Mapping[str, Any]]:
+def resolve(function: str) -> Callable[[Any, Any], Mapping[str, Any]]:
     """The function that `function`, "package.module:name", names.
 
     Raises
@@ -78,13 +93,13 @@ def resolve(function: str) -> Callable[[Any, dict[str, np.ndarray]], Mapping[str
         raise ParameterError(f"function {function!r}: the module {module!r} cannot be imported ({error})") from error
     if not hasattr(found, name):
         raise ParameterError(f"function {function!r}: {module!r} has no {name!r}; {near(name, vars(found))}")
-    computes: Callable[[Any, dict[str, np.ndarray]], Mapping[str, Any]] = getattr(found, name)
+    computes: Callable[[Any, Any], Mapping[str, Any]] = getattr(found, name)
     if not callable(computes):
         raise ParameterError(f"function {function!r} is of type {type(computes).__name__}, not a function")
     return computes
 
 
-def attempt(function: str, arguments: Mapping[str, Any], block: dict[str, np.ndarray]) -> Any:
+def attempt(function: str, arguments: Mapping[str, Any], block: Any) -> Any:
     """The result of the function for a chunk, or the error that it raised. Called in the process that computes."""
     try:
         # A function that changes its arguments must not change those of the next chunk.

@@ -14,9 +14,8 @@ from typing import Any
 
 from saltus.errors import SweepError
 from saltus.sweep.chunk_grid import Index
-from saltus.sweep.chunk_results import Raised, attempt
+from saltus.sweep.chunk_results import Computation, Raised, attempt
 from saltus.sweep.interrupt import deferred_interrupts
-from saltus.sweep.plan import Plan
 
 
 @dataclass(frozen=True)
@@ -31,7 +30,7 @@ class ClusterSettings:
 CLUSTER = ClusterSettings()
 
 
-def on_cluster(plan: Plan, queue: deque[Index], address: str) -> Iterator[tuple[Index, Any]]:
+def on_cluster(plan: Computation, queue: deque[Index], address: str) -> Iterator[tuple[Index, Any]]:
     """Compute the chunks in the queue on the cluster at `address`, and yield the outcome of each as it comes.
 
     A chunk whose worker dies is given to another by the scheduler. The workers need saltus and the plan's function, in the same

@@ -15,7 +15,7 @@ from saltus.errors import ParameterError, SweepError
 from saltus.progress import Progress, silent
 from saltus.public_functions import answered
 from saltus.sweep.chunk_grid import Index
-from saltus.sweep.chunk_results import Failure, Raised, attempt, checked
+from saltus.sweep.chunk_results import Computation, Failure, Raised, attempt, checked
 from saltus.sweep.memory import MemoryResults
 from saltus.sweep.plan import Plan
 from saltus.sweep.store import Store, opened
@@ -135,8 +135,8 @@ class _SweepRun:
         self._report_progress()
         if not self.queue:
             return
-        with closing(_outcomes(self.plan, self.queue, workers, scheduler)) as outcomes:
-            for index, outcome in outcomes:
+        with closing(outcomes(self.plan, self.queue, workers, scheduler)) as found:
+            for index, outcome in found:
                 if isinstance(outcome, Raised):
                     self._fail(index, outcome)
                     continue
@@ -184,7 +184,7 @@ class _SweepRun:
         self.progress(self.done / self.total, f"{self.done} of {self.total} chunks{estimate}" if self.total > 1 else "computing")
 
 
-def _outcomes(plan: Plan, queue: deque[Index], workers: int | Workers | None, scheduler: str | None) -> Any:
+def outcomes(plan: Computation, queue: deque[Index], workers: int | Workers | None, scheduler: str | None) -> Any:
     """Take chunks from the queue until it is empty, and yield the outcome of each, in any order."""
     if scheduler is not None:
         from saltus.sweep.cluster import on_cluster
@@ -195,14 +195,14 @@ def _outcomes(plan: Plan, queue: deque[Index], workers: int | Workers | None, sc
     return _here(plan, queue) if workers is None else workers.outcomes(plan, queue)
 
 
-def _in_processes(plan: Plan, queue: deque[Index], count: int) -> Outcomes:
+def _in_processes(plan: Computation, queue: deque[Index], count: int) -> Outcomes:
     from saltus.sweep.workers import Workers
 
     with Workers(count) as workers:
         yield from workers.outcomes(plan, queue)
 
 
-def _here(plan: Plan, queue: deque[Index]) -> Outcomes:
+def _here(plan: Computation, queue: deque[Index]) -> Outcomes:
     while queue:
         index = queue.popleft()
         yield index, attempt(plan.function, plan.arguments, plan.block(index))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import datetime
 import os
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from saltus.public_functions import answered
 from saltus.sweep import store_files as files
 from saltus.sweep.chunk_grid import MOST_CHUNKS, NAME, ChunkGrid, Index
 from saltus.sweep.chunk_results import Failure
+from saltus.sweep.memo_files import memo_status
 from saltus.sweep.store_arrays import check_arrays
 from saltus.sweep.verification import damaged_chunks
 
@@ -55,6 +57,8 @@ class StoreStatus:
         Whether a run on this machine is writing to it now; None if the file system has no locks.
     damaged
         The files that differ from what was written, if this was checked.
+    remembered
+        What the memo of a search in this store has: the number of chunks of each kind.
 
     Examples
     --------
@@ -75,6 +79,7 @@ class StoreStatus:
     updated: datetime.datetime | None
     running: bool | None
     damaged: tuple[str, ...] = ()
+    remembered: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def failed(self) -> int:
@@ -126,6 +131,7 @@ def status(path: Path | str, *, verify: bool = False) -> StoreStatus:
     for index in broken.values():
         done[index] = False
     updated = max(each.updated for each in found)
+    remembered, unreadable = memo_status(path, verify)
     return StoreStatus(
         path=path,
         kind=str(plan["attrs"].get("kind") or plan["attrs"].get("title") or "sweep"),
@@ -138,7 +144,8 @@ def status(path: Path | str, *, verify: bool = False) -> StoreStatus:
         started=_moment(os.path.getmtime(path / files.METADATA)),
         updated=_moment(updated) if updated else None,
         running=files.in_use(path),
-        damaged=tuple(damaged or broken),
+        damaged=(*(damaged or broken), *unreadable),
+        remembered=remembered,
     )
 
 

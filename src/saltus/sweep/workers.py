@@ -12,8 +12,7 @@ from typing import Any
 
 from saltus.errors import SweepError
 from saltus.sweep.chunk_grid import Index
-from saltus.sweep.chunk_results import Raised, attempt
-from saltus.sweep.plan import Plan
+from saltus.sweep.chunk_results import Computation, Raised, attempt
 
 READY = "ready"
 
@@ -36,7 +35,7 @@ class Workers:
             worker.stop()
         self.pool.clear()
 
-    def outcomes(self, plan: Plan, queue: deque[Index]) -> Iterator[tuple[Index, Any]]:
+    def outcomes(self, plan: Computation, queue: deque[Index]) -> Iterator[tuple[Index, Any]]:
         """Compute the chunks in the queue, and yield the outcome of each as it comes.
 
         If a process dies (killed, out of memory), only its own chunk fails, and another process takes its place.
@@ -83,7 +82,7 @@ class _Worker:
         self.index: Index | None = None
         self.ready = self.dead = False
 
-    def take(self, plan: Plan, index: Index) -> None:
+    def take(self, plan: Computation, index: Index) -> None:
         self.index = index
         with contextlib.suppress(OSError):  # the process has died, which `receive` finds out
             self.connection.send((plan.function, plan.arguments, plan.block(index)))

@@ -1,20 +1,17 @@
-"""The work on the borders of a chart as sweeps, in chunks: what becomes of its changes, and the curves through their ends.
+"""The work on the borders of a chart: what becomes of its changes, and the curves through their ends.
 
-Both are pure functions of arguments that can be written as JSON. The results are kept in folders of the chart's own store, each
-named by a digest of what is computed, so that a run that was stopped goes on.
+Both are pure functions of JSON and arrays, which the memo of the chart's own store remembers, so that a run that was stopped goes
+on.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.lib.recfunctions import structured_to_unstructured, unstructured_to_structured
 
 from saltus.errors import MotionError, ParameterError
 from saltus.orbits import SpecialPoint, continue_special, find_orbit, follow_stable, start_at
@@ -23,19 +20,17 @@ from saltus.provenance import check_provenance, identity
 from saltus.studies.chart.border_curves import curve_dataset
 from saltus.studies.chart.changes import Changes, ChartMotions, Ways, ending_type, trace
 from saltus.studies.chart.follow import lost
-from saltus.studies.chart.motions import motion_type
 from saltus.systems import System
 
 if TYPE_CHECKING:
     import xarray
 
-    from saltus.sweep import Plan
+    from saltus.sweep import Memo
 
-ENDS, CURVES = "saltus.studies.chart.border_work:ends", "saltus.studies.chart.border_work:curves"
+HERE = "saltus.studies.chart.border_work"
 # Changes in a chunk, as many as most charts have: a change whose end takes many steps to enclose costs little if it is followed
 # in lanes together with all others. All take some seconds, which a run that is stopped can afford to lose.
 CHUNK = 10_000
-CURVE_BYTES = 1 << 17  # the most bytes of a curve as text: 1000 points
 # The most points of a curve in each direction. Curves from one side of a chart to the other take 20 to 75. One that needs more
 # creeps along a grazing, by less than a hundredth of a cell a step; four fifths of the time of Fig. 14 (a) went into such steps.
 MOST_POINTS = 100
@@ -60,62 +55,32 @@ class Workshop:
         if not len(changes):
             return np.zeros(0, kind)
         motions = chart.motions[changes.motion]
-        places = {
-            "start": _values(chart, self.paths, changes.source),
-            "end": _values(chart, self.paths, changes.target),
-        }
+        starts, goals = (_values(chart, self.paths, cells) for cells in (changes.source, changes.target))
+        inputs = [{"start": a, "goal": b, "motion": motion} for a, b, motion in zip(starts, goals, motions, strict=True)]
         numbers = {"periods": self.periods, "max_period": self.max_period, "tol": self.tol, "least": chart.least}
-        arguments = {name: {path: a.tolist() for path, a in values.items()} for name, values in places.items()} | numbers
-        arguments["motions"] = {name: motions[name].tolist() for name in motions.dtype.names}
-        size = structured_to_unstructured(np.zeros(1, kind)).shape[1]
-        found = self._run(ENDS, arguments, "change", len(motions), CHUNK, ("number", size), "f8", progress)
-        return np.asarray(unstructured_to_structured(found, kind))
+        from saltus.sweep import MemoKind
+
+        found = self._memo(numbers).results(MemoKind("ends", f"{HERE}:ends", CHUNK), inputs, progress)
+        return np.stack([np.asarray(one["end"]) for one in found])
 
     def curves(self, starts: Sequence[Any], bounds: Any, progress: Progress) -> list[xarray.Dataset | None]:
         """For each list of starts, the curve from the first of them that leads to one, or None."""
-        arguments = {"starts": list(starts), "bounds": bounds}
-        found = self._run(CURVES, arguments, "start", len(starts), 1, ("byte", CURVE_BYTES), "u1", progress)
-        return [_read(row) for row in found]
+        from saltus.sweep import MemoKind
 
-    def _run(
-        self,
-        function: str,
-        arguments: dict[str, Any],
-        axis: str,
-        count: int,
-        chunk: int,
-        extra: Any,
-        dtype: str,
-        progress: Progress,
-    ) -> np.ndarray:
-        from saltus.sweep import Plan, Variable, run
+        kind = MemoKind("curves", f"{HERE}:curves", chunk=1, threaded=False)
+        found = self._memo({"bounds": bounds}).results(kind, list(starts), progress)
+        return [_read(one["curve"]) for one in found]
 
-        arguments |= {"system": self.system.to_json(), "paths": list(self.paths), **identity(self.system)}
-        plan = Plan(
-            function=function,
-            arguments=arguments,
-            axes={axis: np.arange(count)},
-            chunk={axis: chunk},
-            variables={"result": Variable(dtype=dtype, extra=(extra,))},
-            attrs={"kind": "chart_borders"},
-        )
-        store = self._folder(plan)
-        found = run(plan, store, workers=self.workers, scheduler=self.scheduler, progress=progress)
-        return np.asarray(found["result"].values)
+    def _memo(self, numbers: Mapping[str, Any]) -> Memo:
+        from saltus.sweep import Memo
 
-    def _folder(self, plan: Plan) -> Path | None:
-        """The folder of a plan's results, by a digest of it, in the chart's store."""
-        if self.store is None:
-            return None
-        digest = hashlib.sha256(json.dumps(plan.describe(), sort_keys=True).encode()).hexdigest()
-        folder = self.store / "parts"
-        folder.mkdir(parents=True, exist_ok=True)
-        return folder / f"{plan.function.rsplit(':', 1)[1]}_{digest[:12]}"
+        common = {"system": self.system.to_json(), "paths": list(self.paths), **identity(self.system), **numbers}
+        return Memo(common, self.store, self.workers, self.scheduler, patience=0.0)
 
 
-def _values(chart: ChartMotions, paths: tuple[str, str], cells: np.ndarray) -> dict[str, np.ndarray]:
-    """The parameters in the middle of cells (n, 2), by dotted path."""
-    return {paths[0]: chart.horizontal[cells[:, 1]], paths[1]: chart.vertical[cells[:, 0]]}
+def _values(chart: ChartMotions, paths: tuple[str, str], cells: np.ndarray) -> np.ndarray:
+    """The parameters in the middle of cells (n, 2), in the order of the paths, (n, 2)."""
+    return np.column_stack([chart.horizontal[cells[:, 1]], chart.vertical[cells[:, 0]]])
 
 
 def _checked_system(arguments: Mapping[str, Any]) -> System:
@@ -124,53 +89,37 @@ def _checked_system(arguments: Mapping[str, Any]) -> System:
     return system
 
 
-def ends(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """What becomes of some changes of a chart, as rows of numbers."""
-    rows, system = np.asarray(block["change"], dtype=int), _checked_system(arguments)
-    motions = np.zeros(len(rows), motion_type(system.dimension))
-    for name in motions.dtype.names or ():
-        motions[name] = np.array(arguments["motions"][name])[rows]
-    start, end = ({path: np.array(values)[rows] for path, values in arguments[name].items()} for name in ("start", "end"))
-    numbers = {name: arguments[name] for name in ("periods", "max_period", "tol")}
-    found = trace(Ways(system, start, end, motions, **numbers), float(arguments["least"]))
-    return {"result": structured_to_unstructured(found, dtype=float)}
-
-
-def curves(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """Curves on which motions of a chart end, as text in bytes; nothing but zeros where none can be followed."""
+def ends(arguments: Mapping[str, Any], inputs: Sequence[Any]) -> dict[str, np.ndarray]:
+    """What becomes of some changes of a chart."""
     system, paths = _checked_system(arguments), arguments["paths"]
-    rows = []
-    for number in np.asarray(block["start"], dtype=int):
-        found = (curve_from(system, paths, start, arguments["bounds"]) for start in arguments["starts"][number])
+    motions = np.stack([np.asarray(given["motion"]) for given in inputs])
+    places = (np.array([given[name] for given in inputs]) for name in ("start", "goal"))
+    start, goal = (dict(zip(paths, place.T, strict=True)) for place in places)
+    numbers = {name: arguments[name] for name in ("periods", "max_period", "tol")}
+    return {"end": trace(Ways(system, start, goal, motions, **numbers), float(arguments["least"]))}
+
+
+def curves(arguments: Mapping[str, Any], inputs: Sequence[Any]) -> dict[str, Any]:
+    """Curves on which motions of a chart end, as records of datasets; None where none can be followed."""
+    system, paths, rows = _checked_system(arguments), arguments["paths"], []
+    for starts in inputs:  # several for each curve
+        found = (curve_from(system, paths, start, arguments["bounds"]) for start in starts)
         curve = next((c for c in found if c is not None), None)
-        text = b"" if curve is None else json.dumps(as_record(curve)).encode()
-        rows.append(text if len(text) <= CURVE_BYTES else b"")
-    return {"result": np.stack([np.frombuffer(text.ljust(CURVE_BYTES, b"\0"), np.uint8) for text in rows])}
+        rows.append(None if curve is None else as_record(curve))
+    return {"curve": rows}
 
 
 def as_record(data: xarray.Dataset) -> dict[str, Any]:
-    """A dataset as a dictionary that can be written as JSON."""
-    variables = {
-        name: [list(variable.dims), variable.dtype.str, variable.shape, variable.values.tolist(), dict(variable.attrs)]
-        for name, variable in data.variables.items()
-    }
-    attrs = {name: value.item() if isinstance(value, np.generic) else value for name, value in data.attrs.items()}
-    return {"variables": variables, "attrs": attrs}
+    """A dataset as what JSON has, and arrays."""
+    variables = {str(name): [list(each.dims), each.values, dict(each.attrs)] for name, each in data.variables.items()}
+    return {"variables": variables, "attrs": dict(data.attrs)}
 
 
-def _read(row: np.ndarray) -> xarray.Dataset | None:
-    """The dataset whose record is written in a row of bytes; None if there is none."""
+def _read(record: Any) -> xarray.Dataset | None:
+    """The dataset of a record; None if there is none."""
     import xarray
 
-    text = bytes(row).rstrip(b"\0")
-    if not text:
-        return None
-    record = json.loads(text)
-    variables = {
-        name: (dims, np.array(values, dtype=dtype).reshape(shape), attrs)
-        for name, (dims, dtype, shape, values, attrs) in record["variables"].items()
-    }
-    return xarray.Dataset(variables, attrs=record["attrs"])
+    return None if record is None else xarray.Dataset(record["variables"], attrs=record["attrs"])
 
 
 def curve_from(system: System, paths: Sequence[str], start: Mapping[str, Any], bounds: Any) -> xarray.Dataset | None:

@@ -287,7 +287,7 @@ class DiagramSearch:
 
         One comes after the other if other processes compute, or if results are kept.
         """
-        if self.work.parts is None:
+        if self.work.memo is None:
             side_by_side(follow, here, progress)
         else:
             follow(progress)

@@ -1,8 +1,4 @@
-"""Orbits, special points and branches as bytes: what comes back is the same bit for bit, and nothing else is made of bytes."""
-
-import base64
-import pickle
-import zlib
+"""Orbits, special points and branches as JSON and arrays: what comes back is the same bit for bit, and nothing else is made."""
 
 import numpy as np
 import pytest
@@ -11,7 +7,8 @@ from shared_systems import forced
 
 import saltus
 from saltus.errors import ParameterError
-from saltus.orbits import as_bytes, from_bytes, switch_branch
+from saltus.orbits import as_json, from_json, switch_branch
+from saltus.sweep import packed, unpacked
 
 FREQUENCY = "load.frequency"
 
@@ -41,38 +38,34 @@ def assert_same(branch, back):
 @pytest.mark.parametrize("name", FAMILIES)
 def test_a_branch_comes_back_bit_for_bit(name):
     branch = family(name)
-    content = as_bytes(branch)
-    back = from_bytes(content)
+    content = packed(as_json(branch))
+    back = from_json(unpacked(content))
     assert_same(branch, back)
-    assert as_bytes(back) == content
+    assert packed(as_json(back)) == content
 
 
 def test_what_is_born_at_a_special_point_that_came_back_is_the_same():
     branch = family("through folds and grazings")
     special = next(point for point in branch.special if point.kind == "BPC")
-    born, again = (switch_branch(point, (0.25, 1.0), both=False) for point in (special, from_bytes(as_bytes(special))))
+    born, again = (switch_branch(point, (0.25, 1.0), both=False) for point in (special, from_json(as_json(special))))
     for one, other in zip(born, again, strict=True):
         assert_same(one, other)
 
 
-class Harmful:
-    """What a pickle may do: call any function."""
-
-    def __reduce__(self):
-        return print, ("harm",)
-
-
 @pytest.mark.parametrize(
-    "content",
+    "record",
     [
-        b"",
-        b"nothing",
-        zlib.compress(b"nothing"),
-        zlib.compress(pickle.dumps(Harmful())),
-        zlib.compress(pickle.dumps(base64.b64decode)),
+        None,
+        {},
+        {"objects": [], "found": {"object": 0}},
+        {"objects": [["print", ["harm"]]], "found": {"object": 0}},
+        {"objects": [["saltus.__main__", []]], "found": None},
+        {"objects": [["Branch", [1]]], "found": {"object": 0}},
+        {"objects": [["System", ["{}"]]], "found": {"object": 0}},
+        {"objects": [], "found": {"enum": ["SpecialKind", "nothing"]}},
     ],
 )
-def test_bytes_of_anything_else_are_refused_and_run_nothing(content, capsys):
-    with pytest.raises(ParameterError, match="of no orbits"):
-        from_bytes(content)
+def test_a_record_of_anything_else_is_refused_and_runs_nothing(record, capsys):
+    with pytest.raises(ParameterError, match=r"no record of orbits|model"):
+        from_json(record)
     assert capsys.readouterr().out == ""
