@@ -36,7 +36,7 @@ def test_a_chart_with_curves_is_written_said_and_drawn_twice_with_its_borders(sa
     assert total == sum(parts) > 0
     assert parts[2] == 0
     shown = saltus("status", tmp_path / "out" / "stability_chart.zarr").stdout
-    assert re.search(r"ends of borders +1 of 1 chunks done", shown)
+    assert re.search(r"ends +1 chunk remembered", shown)
     assert re.search(r"curves +1 chunk remembered", shown)
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert {"stability_chart.nc", "stability_chart.zarr", "stability_chart.png", "stability_chart.pdf"} <= names

@@ -119,7 +119,9 @@ def _read(record: Any) -> xarray.Dataset | None:
     """The dataset of a record; None if there is none."""
     import xarray
 
-    return None if record is None else xarray.Dataset(record["variables"], attrs=record["attrs"])
+    if record is None:
+        return None
+    return xarray.Dataset({name: tuple(each) for name, each in record["variables"].items()}, attrs=record["attrs"])
 
 
 def curve_from(system: System, paths: Sequence[str], start: Mapping[str, Any], bounds: Any) -> xarray.Dataset | None:
