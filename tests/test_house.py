@@ -51,7 +51,7 @@ MAY_IMPORT = {
     "config": {"systems", "flow", "attractors", "sweep", "studies"},
     "cli": {"systems", "theory", "flow", "taylor", "orbits", "attractors", "sweep", "studies", "plots", "config"},
 }
-TEXTS = {"saltus.taylor.lane_vectors", "saltus.taylor.records"}  # files whose text becomes a part of the lanes' kernels
+TEXTS = {"saltus.taylor.lane_vectors", "saltus.taylor.load_tables", "saltus.taylor.vectors"}  # files whose text becomes a part of the lanes' kernels
 HEAVY = (
     *("scipy", "numba", "xarray", "matplotlib", "h5netcdf", "zarr", "distributed"),
     *("saltus.flow", "saltus.sweep", "saltus_paper"),

@@ -9,7 +9,7 @@ from numba import njit, types
 from saltus.flow.kernel import layout as kernel_layout
 from saltus.flow.kernel.memory_layout import HIGHEST_ORDER, LOWEST_ORDER, SERIES_LENGTH, LanePart
 from saltus.flow.lanes import lane_layout, lane_steps, meeting
-from saltus.taylor import compiled_part, lane_vectors, private_numba
+from saltus.taylor import compiled_part, lane_vectors, numba_types, private_numba
 from saltus.taylor.lane_vectors import (
     ALL,
     load,
@@ -31,7 +31,7 @@ H = 0.7  # the step
 PLACES = np.zeros(len(LanePart), dtype=np.int64)
 PLACES[[LanePart.POSITIONS, LanePart.VELOCITIES, LanePart.ACCELERATIONS]] = 0, SERIES_LENGTH, 2 * SERIES_LENGTH
 STEP, SIGN, TIME, SPEED, CERTAIN, SIZE = range(3 * SERIES_LENGTH, 3 * SERIES_LENGTH + 6)
-COMPILED = {"np": np, "math": math, "SERIES_LENGTH": SERIES_LENGTH} | vars(lane_vectors) | vars(private_numba)
+COMPILED = {"np": np, "math": math, "SERIES_LENGTH": SERIES_LENGTH} | vars(lane_vectors) | vars(private_numba) | vars(numba_types)
 for part in (kernel_layout, lane_layout, lane_steps, meeting):
     exec(compiled_part(part), COMPILED)
 motion_at, only_root, guess_from_end = COMPILED["motion_at"], COMPILED["only_root"], COMPILED["guess_from_end"]

@@ -8,8 +8,7 @@ from numba import njit
 from saltus.flow.kernel import function_types
 from saltus.flow.kernel.compiled import load_structure
 from saltus.systems.parameters import numbers
-from saltus.taylor import record_table, trace
-from saltus.taylor.private_numba import function_type, pointers
+from saltus.taylor import record_table, trace, written_type
 
 
 @cache
@@ -19,8 +18,7 @@ def caller(name):
     arguments = ", ".join(f"x{i}" for i in range(len(signature.args)))
     scope = {}
     exec(f"def call(f, {arguments}):\n    return f({arguments})", scope)
-    with pointers():
-        return njit(signature.return_type(function_type(signature), *signature.args))(scope["call"])
+    return njit(signature.return_type(written_type(signature), *signature.args))(scope["call"])
 
 
 class Generated:

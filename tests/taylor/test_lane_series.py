@@ -16,7 +16,7 @@ from saltus.flow.lanes.compiled_lanes import load_lane_functions
 from saltus.flow.lanes.function_types import LANE_SERIES
 from saltus.flow.lanes.threads import lane_order
 from saltus.systems import Harmonic, Load, Model, Record, System, WallOscillator
-from saltus.taylor import private_numba as jit
+from saltus.taylor import written_type
 from saltus.taylor.graph import RECORD_WIDTH
 from saltus.taylor.vectors import WIDTH
 
@@ -56,9 +56,7 @@ class LaneSeries:
     def __init__(self, system):
         self.run = program(system)
         self.slots, (self.function, *_) = load_lane_functions(self.run.trace)
-        with jit.pointers():
-            kind = jit.function_type(LANE_SERIES)
-            self.call = njit(types.void(kind, types.float64[::1], types.int64))(_call)
+        self.call = njit(types.void(written_type(LANE_SERIES), types.float64[::1], types.int64))(_call)
 
     def coefficients(self, states, order):
         """Of positions, velocities, accelerations, shape (lanes, coordinates, STRIDE); `states` = (t, positions, velocities)."""

@@ -25,7 +25,7 @@ never compile anything. Interfaces of numba that are not public are used in `pri
 """
 
 from saltus._front_door import front_door
-from saltus.taylor.numba_environment import check_environment
+from saltus.taylor.machine_code import check_environment
 
 check_environment()
 __getattr__, __dir__, __all__ = front_door(__name__, __file__)

@@ -1,11 +1,11 @@
-from .cache import cache_directory, compiled_part, digest, is_compiled, load_module, module_name, source_of
+from .cache import cache_directory, digest, source_of
 from .common_form import CommonForm
 from .derivatives import FREQUENCY, derivative_along, partial_derivative, tangent_leaves, time_derivative
-from .equations import equations_of
+from .equations import equations_of, structure_key
 from .exact_algebra import Form, NoNormalForm, constant, constant_value, normal_form
-from .generated import Case, function_text, generated_header
+from .generated import Case, Function, SeriesOf, functions_text, load_functions
 from .graph import RECORD_WIDTH, Expr, differentiate, is_steep, number, ordered, substitute
-from .kernel_functions import by_reference, cached_jit, inline_jit, jit, lean_jit
+from .kernels import by_reference, cached_jit, compiled_part, inline_jit, is_compiled, jit, lean_jit, load_module, module_name
 from .lane_vectors import (
     ALL,
     absolute,
@@ -30,31 +30,35 @@ from .lane_vectors import (
     vector_lane,
     with_lane,
 )
-from .load_tables import record_table, record_tables
+from .load_tables import anchor, expand_record, own_records, record_table, record_tables
 from .memory import Places
-from .private_numba import entry_point, function_type, pointer, pointers
-from .records import anchor, expand_record, own_records
+from .numba_types import Pointer, from_python, function_type, written_type
+from .private_numba import entry_point, pointer
 from .rules import FUNCTIONS
 from .series import Rows
-from .system_structure import structure_key
 from .tapes import shared_constants, tape
 from .tracing import Trace, check_size, trace
-from .vectors import CACHE_LINE, WIDTH
+from .vectors import CACHE_LINE, LANES, SCALAR, WIDTH
 
 __all__ = [
     "ALL",
     "CACHE_LINE",
     "FREQUENCY",
     "FUNCTIONS",
+    "LANES",
     "RECORD_WIDTH",
+    "SCALAR",
     "WIDTH",
     "Case",
     "CommonForm",
     "Expr",
     "Form",
+    "Function",
     "NoNormalForm",
     "Places",
+    "Pointer",
     "Rows",
+    "SeriesOf",
     "Trace",
     "absolute",
     "anchor",
@@ -74,9 +78,9 @@ __all__ = [
     "expand_record",
     "first_lane",
     "fma",
-    "function_text",
+    "from_python",
     "function_type",
-    "generated_header",
+    "functions_text",
     "get",
     "inline_jit",
     "is_compiled",
@@ -85,6 +89,7 @@ __all__ = [
     "lane_count",
     "lean_jit",
     "load",
+    "load_functions",
     "load_module",
     "mask",
     "maximum",
@@ -96,7 +101,6 @@ __all__ = [
     "own_records",
     "partial_derivative",
     "pointer",
-    "pointers",
     "put",
     "record_table",
     "record_tables",
@@ -118,4 +122,5 @@ __all__ = [
     "trace",
     "vector_lane",
     "with_lane",
+    "written_type",
 ]

@@ -1,9 +1,9 @@
-"""Compiled code on disk: generated source files in the user's cache directory, each with numba's compiled code beside it.
+"""Compiled code on disk: the folder that it is kept in, and files that are read only as they were written.
 
-A file's name is a digest of its whole source and of the compiler's options, so that a change of either makes a new file. A file
-is put into its place in one step, so that processes that compile at the same time do not disturb each other. Code from the cache
-is run only if the folder belongs to the user and the file is as it was written: a source is compared with the wanted text, and
-compiled code, Python's and numba's, with its digest. Damaged files are made again, with a remark.
+A file's name has a digest of all that its content depends on, so that a change of it makes a new file. A file is put into its
+place in one step, and of processes that want the same one a single one makes it. Code from the cache is run only if the folder
+belongs to the user and the file is as it was written: compiled code, Python's, numba's and LLVM's, is compared with its digest.
+Damaged files are made again, with a remark.
 """
 
 from __future__ import annotations
@@ -12,30 +12,24 @@ import atexit
 import contextlib
 import hashlib
 import logging
-import marshal
 import os
-import re
 import shutil
 import stat
-import sys
 import tempfile
 import threading
-from collections.abc import Iterator
-from enum import IntEnum
+from collections.abc import Callable, Iterator
 from functools import cache
 from importlib.abc import InspectLoader
-from importlib.util import MAGIC_NUMBER
 from pathlib import Path
-from types import CodeType, ModuleType
+from types import ModuleType
 from typing import cast
 
 from saltus.files import lock
-from saltus.taylor import private_numba, references
 
 NOBODY = 65534  # the user to whom, inside a container, the files of the superuser outside belong
-MARKER = "# --- compiled from here on"
+DIGEST = hashlib.sha256().digest_size  # bytes
+loading = threading.RLock()  # Code is known while it is still being loaded or compiled: other threads wait for it.
 log = logging.getLogger("saltus.cache")
-_loading = threading.RLock()  # A module is in `sys.modules` while it is still being executed: other threads wait for it.
 
 
 def cache_directory() -> Path:
@@ -129,95 +123,64 @@ def source_of(module: ModuleType) -> str:
     return str(cast(InspectLoader, module.__loader__).get_source(module.__name__))
 
 
-@cache
-def compiled_part(module: ModuleType) -> str:
-    """The compiled part of a source file: the text below its marker, with members of `IntEnum`s replaced by their numbers."""
-    numbers = {
-        f"{name}.{member.name}": str(int(member))
-        for name, kind in vars(module).items()
-        if isinstance(kind, type) and issubclass(kind, IntEnum)
-        for member in kind
-    }
-    text = "\n" + source_of(module).split(MARKER, 1)[1].split("\n", 1)[1]
-    return re.sub(r"\b[A-Z]\w*\.[A-Z_]+\b", lambda found: numbers.get(found[0], found[0]), text)
-
-
 def digest(*texts: str) -> str:
     """A name for texts that changes with any of them."""
     return hashlib.sha256("".join(texts).encode()).hexdigest()[:20]
 
 
-def module_name(kind: str, text: str) -> str:
-    """The name of a generated source's module, with a digest of all that its compiled code depends on."""
-    return f"saltus_{kind}_{digest(text, source_of(private_numba), source_of(references))}"
+# --- files ---------------------------------------------------------------------------------------------------------------
 
 
-def is_compiled(name: str) -> bool:
-    """Whether a module's compiled code is on disk."""
-    stem = name.removeprefix("saltus_")
-    return any((cache_directory() / "__pycache__").glob(f"{stem}.*.nbi"))
+def kept_bytes(name: str, make: Callable[[], bytes]) -> bytes:
+    """The content of a file of the cache: read, or made and written first."""
+    path = cache_directory() / name
+    with loading:
+        content = undamaged(str(path))
+        if content is None:
+            with alone(path):
+                content = undamaged(str(path))  # another process may have made it meanwhile
+                if content is None:
+                    content = make()
+                    with contextlib.suppress(OSError):
+                        write(path, with_digest(content))
+    return content
 
 
-def load_module(kind: str, text: str) -> ModuleType:
-    """The module of a generated source: loaded, or written and compiled first."""
-    name = module_name(kind, text)
-    with _loading:
-        if name not in sys.modules:
-            path = cache_directory() / f"{name.removeprefix('saltus_')}.py"
-            with contextlib.nullcontext() if _holds(path, text) and is_compiled(name) else _alone(path):
-                if not _holds(path, text):
-                    if path.exists():
-                        log.warning("%s is damaged; it is written again", path)
-                    _write(path, text.encode())
-                _execute(name, path, text)
-        return sys.modules[name]
+def with_digest(content: bytes) -> bytes:
+    """The content of a file of compiled code: the code, followed by the digest of its bytes."""
+    return content + hashlib.sha256(content).digest()
+
+
+def undamaged(path: str) -> bytes | None:
+    """The code in a file, without its digest, or None; a damaged file, a link or another user's file is removed, with a remark.
+
+    The owner is checked because anybody can compute a digest: a file of another user, or a link, was planted while others could
+    write to the folder.
+    """
+    try:
+        found = os.lstat(path)
+        own = stat.S_ISREG(found.st_mode) and (not hasattr(os, "getuid") or found.st_uid == os.getuid())
+        content = Path(path).read_bytes() if own else b""
+    except OSError:
+        return None
+    if own and with_digest(content[:-DIGEST]) == content:
+        return content[:-DIGEST]
+    log.warning("%s is %s; it is compiled again", path, "damaged" if own else "not the user's own")
+    with contextlib.suppress(OSError):
+        os.unlink(path)
+    return None
 
 
 @contextlib.contextmanager
-def _alone(path: Path) -> Iterator[None]:
-    """Let other processes that need the same source wait and then load the code that this one has compiled; if files cannot be
-    locked, they compile it too. The lock is on a file beside the source, because the source itself may be replaced."""
+def alone(path: Path) -> Iterator[None]:
+    """Let other processes that need the same file wait and then load the code that this one has compiled; if files cannot be
+    locked, they compile it too. The lock is on a file beside it, because the file itself may be replaced."""
     with path.with_suffix(".lock").open("ab") as file:
         lock(file, wait=True)
         yield
 
 
-def _holds(path: Path, text: str) -> bool:
-    """Whether a file has this text."""
-    try:
-        return path.is_file() and path.read_bytes() == text.encode()
-    except OSError:
-        return False
-
-
-def _execute(name: str, path: Path, text: str) -> None:
-    """Make a module of a source that is also in a file, beside which numba keeps the compiled code."""
-    module = ModuleType(name)
-    module.__file__ = str(path)
-    sys.modules[name] = module  # numba finds the functions of a cached module through here
-    try:
-        with private_numba.pointers():
-            exec(_bytecode(path, text), vars(module))
-    except BaseException:  # interrupted while compiling: the next call starts afresh
-        del sys.modules[name]
-        raise
-
-
-def _bytecode(path: Path, text: str) -> CodeType:
-    """A source's bytecode, which is kept beside numba's code: parsing the text would take longer than loading numba's code."""
-    file = path.parent / "__pycache__" / f"{path.stem}.{MAGIC_NUMBER.hex()}.bytecode"
-    content = private_numba.undamaged(str(file))
-    if content is not None:
-        kept: CodeType = marshal.loads(content)
-        if kept.co_filename == str(path):  # the folder has not been moved
-            return kept
-    code = compile(text, str(path), "exec")
-    with contextlib.suppress(OSError):
-        _write(file, private_numba.with_digest(marshal.dumps(code)))
-    return code
-
-
-def _write(path: Path, content: bytes) -> None:
+def write(path: Path, content: bytes) -> None:
     """Write a file into its place in one step. All files get the same time, because numba uses code that it has kept only for a
     source with the same time."""
     handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")

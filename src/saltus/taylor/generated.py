@@ -1,25 +1,33 @@
-"""The text of a generated file: tapes, and for each function the few lines that numba compiles around the code written for it.
+"""The functions of a structure: their tapes, LLVM's text that is written for them, and their machine code, from the disk or made.
 
-The code itself is written directly for LLVM, by `series.py` and `instants.py`: numba, which would need seconds to infer the
-types of a structure's recurrences, sees one call in each function, and keeps its cache.
+The text is written by `series.py` and by `instant` here. numba has no part in it: it would need seconds to infer the types of a
+structure's recurrences, and its cache is slower to read than an object file.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
-from saltus.taylor import graph, instants, memory, records, rules, series, sums, tapes, vectors
-from saltus.taylor.cache import digest, source_of
-from saltus.taylor.instants import instant
+from llvmlite import binding, ir
+
+from saltus.taylor import graph, load_tables, machine_code, memory, numba_types, rules, series, sums, tapes, vectors
+from saltus.taylor.cache import digest, kept_bytes, source_of
+from saltus.taylor.graph import LEAVES
+from saltus.taylor.machine_code import Loaded
 from saltus.taylor.memory import Memory, Place, Places
-from saltus.taylor.private_numba import written
+from saltus.taylor.numba_types import Pointer, given_arguments, result_count, written_function, written_type
+from saltus.taylor.rules import FUNCTIONS
 from saltus.taylor.series import Rows, Series
 from saltus.taylor.tapes import Tape
-from saltus.taylor.vectors import CACHE_LINE, LONG, Arithmetic
+from saltus.taylor.vectors import CACHE_LINE, LONG, Arithmetic, Vec, add, multiply, subtract
+
+ARITHMETIC: dict[str, Callable[[Any, Any], Any]] = {"add": add, "sub": subtract, "mul": multiply, "div": lambda a, b: a / b}
+SIGNS = {"greater": ">", "less": "<", "greater_equal": ">=", "less_equal": "<="}
+MIRRORED = str.maketrans("<>", "><")
 
 
 @dataclass(frozen=True)
@@ -31,36 +39,64 @@ class Case:
     when: Sequence[tuple[str, int]] = ()
 
 
-def write_series(arithmetic: Arithmetic, places: Places, rows: Rows, tape: Tape) -> Any:
-    """A function that puts the Taylor coefficients of a motion, and of the further roots of its tape, into memory."""
+class SeriesOf(NamedTuple):
+    """The series that a function computes: of a tape, into rows."""
 
-    def write(builder: Any, *arguments: Any) -> list[Any]:
-        if arithmetic.width > 1:
-            stack_of_cache_lines(builder.function, CACHE_LINE)
-        Series(Memory(builder, arithmetic, places, arguments), tape, rows).write_motion(tape.roots)
-        return []
-
-    return written(write, 0)
+    rows: Rows
+    tape: Tape
 
 
-def write_instants(arithmetic: Arithmetic, places: Places, cases: Sequence[Case]) -> Any:
-    """A function of one instant with several cases, without fused multiply-adds. Only a case that always holds has results."""
+@dataclass(frozen=True)
+class Function:
+    """A function of a structure: the series of a tape, or cases of an instant, of which only one that always holds has results.
 
-    def write(builder: Any, *arguments: Any) -> list[Any]:
-        memory, results = Memory(builder, arithmetic.unfused(), places, arguments), list[Any]()
-        for case in cases:
-            conditions = [builder.icmp_signed("==", memory.arguments[name], LONG(value)) for name, value in case.when]
-            if not conditions:
-                results += _store(memory, case)
-                continue
-            holds = conditions[0]
-            for condition in conditions[1:]:
-                holds = builder.and_(holds, condition)
-            with builder.if_then(holds):
-                _store(memory, case)
-        return results
+    An instant is computed without fused multiply-adds.
+    """
 
-    return written(write, sum(target is None for case in cases for target in case.targets))
+    name: str
+    signature: Any  # numba's
+    places: Places
+    arithmetic: Arithmetic
+    content: SeriesOf | Sequence[Case]
+
+    def write(self, module: Any) -> None:
+        """Append the function to LLVM's module."""
+        function = ir.Function(module, written_function(self.signature), self.name)
+        builder, results = ir.IRBuilder(function.append_basic_block("entry")), list[Any]()
+        arguments = given_arguments(self.signature, function)
+        if isinstance(self.content, SeriesOf):
+            rows, tape = self.content
+            if self.arithmetic.width > 1:
+                stack_of_cache_lines(function, CACHE_LINE)
+            Series(Memory(builder, self.arithmetic, self.places, arguments), tape, rows).write_motion(tape.roots)
+        else:
+            memory = Memory(builder, self.arithmetic.unfused(), self.places, arguments)
+            results = [value for case in self.content for value in _write_case(memory, case)]
+        self._return(builder, function, results)
+
+    def _return(self, builder: Any, function: Any, results: list[Any]) -> None:
+        """The end of the function, with its results."""
+        assert len(results) == result_count(self.signature)
+        if len(results) == 1:
+            builder.ret(results[0])
+            return
+        for i, result in enumerate(results):
+            builder.store(result, builder.gep(function.args[-1], [LONG(i)]))
+        builder.ret_void()
+
+
+def _write_case(memory: Memory, case: Case) -> list[Any]:
+    """A case of an instant, and LLVM's values of its results."""
+    builder = memory.builder
+    conditions = [builder.icmp_signed("==", memory.arguments[name], LONG(value)) for name, value in case.when]
+    if not conditions:
+        return _store(memory, case)
+    holds = conditions[0]
+    for condition in conditions[1:]:
+        holds = builder.and_(holds, condition)
+    with builder.if_then(holds):
+        _store(memory, case)
+    return []
 
 
 def _store(memory: Memory, case: Case) -> list[Any]:
@@ -72,39 +108,76 @@ def _store(memory: Memory, case: Case) -> list[Any]:
     return [memory.value(value) for target, value in values if target is None]
 
 
-@cache
-def generated_header(*more: str) -> str:
-    """The first lines of a generated file; they contain a digest of the sources that write the code which the file only names."""
-    writers = (graph, instants, memory, records, rules, series, sums, tapes, vectors, sys.modules[__name__])
-    written_by = digest(*(source_of(module) for module in writers))
-    lines = ['"""Generated by saltus; safe to delete."""', "import math", "", "import numpy as np", ""]
-    lines += ["from saltus.taylor.generated import Case, Places, Rows, Tape, write_instants, write_series"]
-    lines += ["from saltus.taylor.private_numba import pointed_jit", "from saltus.taylor.vectors import LANES, SCALAR"]
-    return "\n".join([*lines, *more, f"# {vectors.WIDTH} lanes, written by {written_by}", "", ""])
+def instant(memory: Memory, tape: Tape) -> list[Vec | float]:
+    """The roots' numbers at the time and state that the leaves have."""
+    values: list[Any] = []
+    for node in tape.nodes:
+        if node[0] in (*LEAVES, "constant"):
+            values.append(memory.leaf(node))
+        else:
+            values.append(_operation(memory, node[0], [values[i] for i in node[1:]]))
+    return [values[root] for root in tape.roots]
 
 
-def function_text(name: str, places: Places, arithmetic: str, content: Sequence[Rows | Tape | Case], python: bool = False) -> str:
-    """A function of a generated file: the series of rows and a tape, or cases; its signature has its name in capitals."""
-    arguments = ", ".join(places.arguments)
-    is_series = any(isinstance(part, Rows) for part in content)
-    given = ", ".join(map(repr, content)) if is_series else f"[{', '.join(map(repr, content))}]"
-    return "\n".join(
-        [
-            f"_{name} = write_{'series' if is_series else 'instants'}({arithmetic}, {places!r}, {given})",
-            *("", ""),
-            f"@pointed_jit({name.upper()}{', python=True' if python else ''})",
-            f"def {name}({arguments}):",
-            f"    return _{name}(({arguments},))",
-            *("", "", ""),
-        ]
-    )
+def _operation(memory: Memory, op: str, args: list[Any]) -> Any:
+    """An operation on numbers; comparisons give masks."""
+
+    def lifted(x: Any) -> Vec:
+        return x if isinstance(x, Vec) else memory.arithmetic.number(memory.builder, x)
+
+    a, b = args[0], args[-1]
+    if op in ARITHMETIC:
+        return ARITHMETIC[op](a, b)
+    if op in SIGNS:
+        return a.compare(SIGNS[op], b) if isinstance(a, Vec) else b.compare(SIGNS[op].translate(MIRRORED), a)
+    if op == "where":
+        return lifted(args[1]).select(a, b)
+    if op in ("maximum", "minimum"):
+        return lifted(b).select(lifted(b).compare(">" if op == "maximum" else "<", a), a)
+    assert op in FUNCTIONS or op == "pow"
+    return lifted(a).function(op, *args[1:])
 
 
 def stack_of_cache_lines(function: Any, line: int) -> None:
     """Align the stack such that each vector on it lies within one cache line; otherwise every use would touch two.
 
-    LLVM aligns the stack for variables, but not for values that it moves out of registers later. A function that is inlined into
-    its caller would lose the attribute.
+    LLVM aligns the stack for variables, but not for values that it moves out of registers later.
     """
     function.attributes.alignstack = line
-    function.attributes.add("noinline")
+
+
+# --- text and machine code ---------------------------------------------------------------------------------------------------
+
+
+def functions_text(functions: Sequence[Function]) -> str:
+    """Functions as text, which is all that their code depends on besides `written_by`."""
+    return "\n".join(map(repr, functions))
+
+
+@cache
+def written_by() -> str:
+    """A digest of the sources that write code, and of what LLVM makes of it on this machine."""
+    writers = (graph, load_tables, machine_code, memory, numba_types, rules, series, sums, tapes, vectors, sys.modules[__name__])
+    return digest(*(source_of(module) for module in writers), machine_code.made_for())
+
+
+def llvm_text(functions: Sequence[Function]) -> str:
+    """The functions as LLVM's text."""
+    module = ir.Module("saltus")
+    module.triple = binding.get_process_triple()
+    for function in functions:
+        function.write(module)
+    return str(module)
+
+
+def load_functions(kind: str, functions: Sequence[Function]) -> dict[str, Pointer]:
+    """Pointers to functions by their names: loaded from the disk, or written and compiled first."""
+    name = f"{kind}_{digest(functions_text(functions), written_by())}"
+    if name not in _loaded:
+        code = kept_bytes(f"{name}.o", lambda: machine_code.object_code(llvm_text(functions)))
+        _loaded[name] = Loaded(code, [function.name for function in functions])
+    addresses = _loaded[name].addresses
+    return {each.name: Pointer.to(addresses[each.name], written_type(each.signature)) for each in functions}
+
+
+_loaded: dict[str, Loaded] = {}  # as long as the process, as pointers may be anywhere

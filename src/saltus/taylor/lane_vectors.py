@@ -13,7 +13,7 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 
-from saltus.taylor.private_numba import Array, inlined, operator_meaning, register_type
+from saltus.taylor.numba_types import Array, inlined, operator_meaning, register_type
 from saltus.taylor.vectors import BIT, DOUBLE, INDEX, LANES, LONG, WIDTH, Vec
 
 ALL = (1 << WIDTH) - 1  # every lane, as bits

@@ -3,6 +3,8 @@
 A trace reads rows of such a table by (dotted path, order). For a record the order is that of the derivative. A pulse is a closed
 form in its own time; its rows are polynomials of degree 1: SINCE, the time since its start, at most its length; WITHIN, the
 derivative of SINCE, 1 within the pulse and else 0; AFTER, the time since its end; and the derivative of AFTER.
+
+The last part is compiled together with the lanes; `memory.py` runs the same functions while it writes the code of one motion.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ import numpy as np
 
 from saltus.systems import Pulse, Record, System, substitute
 from saltus.taylor.graph import RECORD_WIDTH
+from saltus.taylor.kernels import jit
 
 SINCE, WITHIN, AFTER = 0, 1, 10
 
@@ -100,3 +103,31 @@ def _fill(row: np.ndarray, breaks: np.ndarray, record: Record, order: int) -> No
         velocity = record.polynomials[1](edge)
         row[where, 0] = velocity if order == 1 else record.polynomials[0](edge) + velocity * (anchor - edge)
         row[where, 1] = 0.0 if order == 1 else velocity
+
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+
+@jit
+def anchor(breaks, piece):
+    """The time that a record's piece counts from."""
+    return breaks[max(piece - 1, 0)]
+
+
+@jit
+def own_records(tables, trajectory):
+    """The breakpoints and the table of one trajectory; all trajectories share one of each if no breakpoint depends on it."""
+    breaks, table = tables
+    i = min(trajectory, breaks.shape[0] - 1)
+    return breaks[i], table[i]
+
+
+@jit
+def expand_record(coefficients, start, t, row):
+    """Taylor coefficients at `t` of a record's piece, given in powers of the time since `start`."""
+    width = coefficients.size
+    for k in range(width):
+        row[k] = coefficients[k]
+    for k in range(width - 1):  # repeated synthetic division: p(x + t - start)
+        for j in range(width - 2, k - 1, -1):
+            row[j] += (t - start) * row[j + 1]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from saltus.taylor.graph import RECORD_WIDTH
-from saltus.taylor.records import expand_record
+from saltus.taylor.load_tables import expand_record
 from saltus.taylor.tapes import Node
 from saltus.taylor.vectors import DOUBLE, LONG, Arithmetic, Vec
 
@@ -113,5 +113,5 @@ class Memory:
             return time - self.load(self.leaves["record_time"])
         before = self.builder.sub(self.arguments["piece"], LONG(1))
         index = self.builder.select(self.builder.icmp_signed("<", before, LONG(0)), LONG(0), before)
-        anchor = self.at(self.builder.gep(self.arguments["breaks"].data, [index]))  # as `records.anchor` has it
+        anchor = self.at(self.builder.gep(self.arguments["breaks"].data, [index]))  # as `load_tables.anchor` has it
         return time + self.leaf(("origin",)) - Vec(self.builder, anchor, self.arithmetic)

@@ -25,10 +25,6 @@ class Tape:
     nodes: list[Node]
     roots: list[int]
 
-    def __repr__(self) -> str:
-        nodes = "".join(f"    {node!r},\n" for node in self.nodes)
-        return f"Tape([\n{nodes}], {self.roots!r})".replace("nan", "math.nan").replace("inf", "math.inf")
-
 
 def shared_constants(roots: Sequence[Expr]) -> Constants:
     """The largest parts of the roots that depend on parameters alone; they are computed once for a motion and kept in a table."""

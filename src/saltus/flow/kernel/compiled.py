@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -21,20 +21,23 @@ from saltus.flow.kernel import event_derivatives, function_types, layout, roots,
 from saltus.flow.kernel.memory_layout import State
 from saltus.flow.one_contact import chatter, impacts, kernel, segments, sides
 from saltus.taylor import (
+    SCALAR,
     Case,
     Expr,
+    Function,
     Places,
+    Pointer,
     Rows,
+    SeriesOf,
     Trace,
     compiled_part,
     digest,
     entry_point,
-    function_text,
-    generated_header,
+    from_python,
     is_steep,
+    load_functions,
     load_module,
     number,
-    pointer,
     shared_constants,
     source_of,
     substitute,
@@ -47,8 +50,8 @@ _SIGNATURES = f"""import math
 import numpy as np
 
 from saltus.flow.kernel.function_types import *
+from saltus.taylor.numba_types import by_reference
 from saltus.taylor.private_numba import cached_jit, inline_jit, jit, lean_jit
-from saltus.taylor.references import by_reference
 # types of {digest(source_of(function_types))}
 """
 ENV = {"parameter": ("parameters", 0), "constant": ("constants", 0), "record": ("table", 0)}
@@ -56,43 +59,48 @@ LEAVES = ENV | {"time": ("t", 0), "origin": ("origin", 0), "side": ("side", 0)}
 HERE = {"coordinate": ("state", State.COORDINATES.value)}  # in the kernel's state
 
 
+class Sizes(NamedTuple):
+    """The sizes of a structure, in the order of the kernel's `STRUCTURE_SIZES`."""
+
+    dof: int  # coordinates, with the tangent's
+    stops: int  # margins
+    rows: int  # of the workspace
+    sides: int
+    steep: int  # whether steps are checked
+    own: int  # the model's own coordinates
+    columns: int  # of the tangent
+
+
 @dataclass(frozen=True)
 class Structure:
     """The compiled functions of a traced structure, and its sizes."""
 
-    module: ModuleType
+    sizes: Sizes
+    constant_count: int
     # The functions that the kernel calls: series, contact_series, reset, contact_damping, tangent; with several contacts series,
     # matrices, matrix_slopes, tangent.
-    functions: tuple[Any, ...]
-    constants: Callable[..., None]
-    geometry: Callable[..., None] | None  # of a model with one contact; None with several
+    functions: tuple[Pointer, ...]
+    tables: tuple[Pointer, ...]  # `constants` and `geometry` (with several contacts `matrices`), which the lanes' driver calls
+    several: bool
     signs: tuple[int, ...] = ()  # of the contacts, if there are several
     frictions: int = 0
 
     def prepare(self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
         """The arguments `env` and `model` of the kernel for given numbers (see `one_contact/kernel.py`)."""
-        constants, geometry = np.zeros(self.module.CONSTANT_COUNT), np.zeros(3)
-        self.constants(parameters, constants)
-        if self.geometry is None:
-            modes = np.append(np.zeros(self.frictions), np.ones(self.module.OWN))
+        constants, geometry = np.zeros(self.constant_count), np.zeros(3)
+        fill_constants, fill_geometry = self._fill
+        fill_constants(parameters, constants)
+        if self.several:
+            modes = np.append(np.zeros(self.frictions), np.ones(self.sizes.own))
             env = (np.append(parameters, modes), constants, *records)
             return env, (*self.functions[:2], np.array(self.signs, dtype=float), *self.functions[2:])
         env = (parameters, constants, *records)
-        self.geometry(env, geometry)
+        fill_geometry(env, geometry)
         return env, (*self.functions[:4], geometry, self.functions[4])
 
     @cached_property
-    def tables(self) -> tuple[Any, ...]:
-        """Pointers to `constants` and to `geometry` (with several contacts `matrices`), which the lanes' driver calls."""
-        return tuple(
-            pointer(getattr(self.module, name)) for name in ("constants", "matrices" if self.geometry is None else "geometry")
-        )
-
-    @property
-    def sizes(self) -> tuple[int, ...]:
-        """The numbers of coordinates with the tangent's, margins, rows of the workspace and sides; whether steps are checked; and
-        the numbers of the model's own coordinates and of columns of the tangent."""
-        return tuple(getattr(self.module, name) for name in ("DOF", "STOPS", "ROWS", "SIDES", "STEEP", "OWN", "COLUMNS"))
+    def _fill(self) -> tuple[Callable[..., None], ...]:
+        return tuple(map(from_python, self.tables))
 
 
 @cache
@@ -150,14 +158,17 @@ def _text(*modules: ModuleType) -> str:
 
 def load_structure(trace: Trace) -> Structure:
     """The functions of a trace's structure."""
-    module = load_module("structure", generated_header(_SIGNATURES) + structure_text(trace))
+    made = load_functions("structure", structure_functions(trace))
     several = ("series", "matrices", "matrix_slopes", "tangent")
     names = several if trace.several else ("series", "contact_series", "reset", "contact_damping", "tangent")
+    stops, steep = len(trace.reactions) + len(trace.margins), int(is_steep(trace.acceleration))
+    sizes = Sizes(len(trace.acceleration), stops, 1, trace.sides, steep, trace.dof, trace.columns)
     return Structure(
-        module,
-        tuple(pointer(getattr(module, name)) for name in names),
-        entry_point(module.constants),
-        None if trace.several else entry_point(module.geometry),
+        sizes,
+        max(1, len(constants(trace))),
+        tuple(made[name] for name in names),
+        (made["constants"], made["matrices" if trace.several else "geometry"]),
+        trace.several,
         trace.signs,
         len(trace.rubbed),
     )
@@ -166,37 +177,28 @@ def load_structure(trace: Trace) -> Structure:
 # --- the functions of a structure ------------------------------------------------------------------------------------------
 
 
-def structure_text(trace: Trace) -> str:
-    """The source of a structure's functions; equal structures have equal sources, whatever their numbers."""
+def structure_functions(trace: Trace) -> list[Function]:
+    """A structure's functions; equal structures have equal functions, whatever their numbers."""
     known = constants(trace)
-    sizes = {
-        "DOF": len(trace.acceleration),
-        "OWN": trace.dof,
-        "COLUMNS": trace.columns,
-        "STOPS": len(trace.reactions) + len(trace.margins),
-        "ROWS": 1,
-        "SIDES": trace.sides,
-        "STEEP": int(is_steep(trace.acceleration)),
-        "CONSTANT_COUNT": max(1, len(known)),
-    }
     impact = [x for x in (trace.next_side, trace.velocity_after) if x is not None] or [number(0.0)] * 2
     damping = [number(0.0) if trace.contact_damping is None else trace.contact_damping]
     instant = ("side", "env", "piece")
     functions = [_series(trace, known), _table("constants", Places(("parameters", "constants"), ENV), list(known), {})]
     if trace.several:
-        return _source(sizes, [*functions, _matrices(trace, known), _matrix_slopes(trace, known), _tangent(trace, known)])
-    functions += [
+        return [*functions, _matrices(trace, known), _matrix_slopes(trace, known), _tangent(trace, known)]
+    return [
+        *functions,
         _contact_series(trace, known),
         _at_impact("reset", ("t", "origin", "v0", *instant), impact, known),
         _at_impact("contact_damping", ("t", "origin", *instant), damping, known),
         _tangent(trace, known),
         _table("geometry", Places(("env", "out"), ENV), _geometry(trace), known),
     ]
-    return _source(sizes, functions)
 
 
-def _source(sizes: dict[str, int], functions: list[str]) -> str:
-    return "\n".join([*(f"{name} = {value!r}" for name, value in sizes.items()), "", *functions])
+def _function(name: str, places: Places, content: Sequence[Any]) -> Function:
+    """A function of one motion; its signature has its name in `function_types.py`."""
+    return Function(name, getattr(function_types, name.upper()), places, SCALAR, content)
 
 
 def constants(trace: Trace) -> dict[Expr, int]:
@@ -239,7 +241,7 @@ def _geometry(trace: Trace) -> list[Expr]:
     return [trace.contact, *(substitute(trace.gap_rate, {Expr("side"): side}) for side in (1.0, -1.0))]
 
 
-def _series(trace: Trace, known: dict[Expr, int]) -> str:
+def _series(trace: Trace, known: dict[Expr, int]) -> Function:
     """The Taylor coefficients of the coordinates, velocities, accelerations, the gap and the margins from one state."""
     rows = range(len(trace.acceleration))
     gap = [] if trace.gap is None else [("g", 0)]
@@ -248,7 +250,7 @@ def _series(trace: Trace, known: dict[Expr, int]) -> str:
     places = Places(("t", "origin", "side", "env", "piece", "q", "v", "a", "g", "m", "w", "order"), leaves)
     layout = Rows([("q", i) for i in rows], [("v", i) for i in rows], targets, MOST_COEFFICIENTS, any_order=True)
     motion = tape([*trace.acceleration, *motion_roots(trace)], known, series=True)
-    return function_text("series", places, "SCALAR", [layout, motion])
+    return _function("series", places, SeriesOf(layout, motion))
 
 
 def _free(trace: Trace) -> dict[str, tuple[str, int]]:
@@ -257,36 +259,36 @@ def _free(trace: Trace) -> dict[str, tuple[str, int]]:
     return {"slide": ("parameters", first), "free": ("parameters", first + len(trace.rubbed))}
 
 
-def _contact_series(trace: Trace, known: dict[Expr, int]) -> str:
+def _contact_series(trace: Trace, known: dict[Expr, int]) -> Function:
     """The Taylor coefficients in the time of the gap's second derivative at rest at contact."""
     places = Places(("t", "origin", "side", "env", "piece", "b", "w", "order"), LEAVES)
     if trace.contact_acceleration is None:
-        return function_text("contact_series", places, "SCALAR", [])
+        return _function("contact_series", places, [])
     layout = Rows([], [], [("b", 0)], MOST_COEFFICIENTS, any_order=True)
-    return function_text("contact_series", places, "SCALAR", [layout, tape([trace.contact_acceleration], known, series=True)])
+    return _function("contact_series", places, SeriesOf(layout, tape([trace.contact_acceleration], known, series=True)))
 
 
-def _matrices(trace: Trace, known: dict[Expr, int]) -> str:
+def _matrices(trace: Trace, known: dict[Expr, int]) -> Function:
     """The mass matrix, E, the positions of the contacts and the speeds of the grounds at a state, one after the other."""
     roots = trace.contact_numbers
     places = Places(("env", "piece", "state", "out"), ENV | HERE)
-    return function_text("matrices", places, "SCALAR", [Case(tape(roots, known), [("out", i) for i in range(len(roots))])])
+    return _function("matrices", places, [Case(tape(roots, known), [("out", i) for i in range(len(roots))])])
 
 
-def _matrix_slopes(trace: Trace, known: dict[Expr, int]) -> str:
+def _matrix_slopes(trace: Trace, known: dict[Expr, int]) -> Function:
     """The derivatives, along each column of the tangent, of the numbers that `matrices` fills; one column after the other."""
     roots, places = event_derivatives.number_slopes(trace), Places(("env", "piece", "state", "out"), ENV | HERE)
     cases = [Case(tape(roots, known), [("out", i) for i in range(len(roots))])] if roots else []
-    return function_text("matrix_slopes", places, "SCALAR", cases)
+    return _function("matrix_slopes", places, cases)
 
 
-def _at_impact(name: str, arguments: tuple[str, ...], roots: list[Expr], known: dict[Expr, int]) -> str:
+def _at_impact(name: str, arguments: tuple[str, ...], roots: list[Expr], known: dict[Expr, int]) -> Function:
     """A function that returns the values of expressions at an instant, for the velocity `v0`."""
     places = Places(arguments, LEAVES | {"velocity": ("v0", 0)})
-    return function_text(name, places, "SCALAR", [Case(tape(roots, known), [None] * len(roots))])
+    return _function(name, places, [Case(tape(roots, known), [None] * len(roots))])
 
 
-def _tangent(trace: Trace, known: dict[Expr, int]) -> str:
+def _tangent(trace: Trace, known: dict[Expr, int]) -> Function:
     """The function that transforms the tangent's columns, in the kernel's state (see `State`), at each kind of event."""
     count, first = len(trace.acceleration), State.COORDINATES.value
     starts = {"coordinate": first, "velocity": first + count, "shift": first + 2 * count}
@@ -296,10 +298,10 @@ def _tangent(trace: Trace, known: dict[Expr, int]) -> str:
         targets = [("state", starts[leaf.op] + leaf.value) for leaf in changes]
         cases.append(Case(tape(list(changes.values()), known), targets, (("kind", int(kind)), ("detail", int(detail)))))
     places = Places(("kind", "detail", "t", "origin", "side", "env", "piece", "state"), LEAVES | _free(trace) | state)
-    return function_text("tangent", places, "SCALAR", cases)
+    return _function("tangent", places, cases)
 
 
-def _table(name: str, places: Places, roots: list[Expr], known: dict[Expr, int]) -> str:
+def _table(name: str, places: Places, roots: list[Expr], known: dict[Expr, int]) -> Function:
     """A function that fills its last argument with the values of expressions of the parameters."""
     targets = [(places.arguments[-1], i) for i in range(len(roots))]
-    return function_text(name, places, "SCALAR", [Case(tape(roots, known), targets)], python=True)
+    return _function(name, places, [Case(tape(roots, known), targets)])

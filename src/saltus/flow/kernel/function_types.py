@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numba import types
 
-from saltus.taylor import function_type, pointers
+from saltus.taylor import written_type
 
 _f, _i = types.float64, types.int64
 _f1, _f2, _f3 = (types.Array(_f, n, "C") for n in (1, 2, 3))
@@ -20,11 +20,10 @@ CONTACT_DAMPING = _f(_f, _f, _f, ENV, _i)
 TANGENT = types.void(_i, _i, _f, _f, _f, ENV, _i, _f1)
 MATRICES = MATRIX_SLOPES = types.void(ENV, _i, _f1, _f1)
 
-with pointers():
-    _functions = [function_type(s) for s in (SERIES, CONTACT_SERIES, RESET, CONTACT_DAMPING, TANGENT)]
-    MODEL = types.Tuple((*_functions[:4], _f1, _functions[4]))
-    _matrices = function_type(MATRICES)
-    CONTACT_MODEL = types.Tuple((_functions[0], _matrices, _f1, _matrices, _functions[4]))
+_functions = [written_type(s) for s in (SERIES, CONTACT_SERIES, RESET, CONTACT_DAMPING, TANGENT)]
+MODEL = types.Tuple((*_functions[:4], _f1, _functions[4]))
+_matrices = written_type(MATRICES)
+CONTACT_MODEL = types.Tuple((_functions[0], _matrices, _f1, _matrices, _functions[4]))
 STEP_BUFFERS, EVENT_BUFFERS = types.Tuple((_i2, _f2, _f3)), types.Tuple((_i2, _f2))
 ADVANCE = _i(_i1, _f1, _f1, ENV, MODEL, STEP_BUFFERS, EVENT_BUFFERS)
 ADVANCE_CONTACTS = _i(_i1, _f1, _f1, ENV, CONTACT_MODEL, _i2, STEP_BUFFERS, EVENT_BUFFERS)

@@ -34,33 +34,38 @@ from saltus.flow.lanes import (
     scalar_fallback,
     scalar_handoff,
 )
-from saltus.flow.lanes.lane_functions import Slots, lane_functions_text, slots_of
+from saltus.flow.lanes.lane_functions import Slots, lane_functions, slots_of
 from saltus.flow.one_contact import lane_step as one_contact
 from saltus.flow.one_contact import sides as contact_side
 from saltus.taylor import (
+    WIDTH,
     Trace,
     check_size,
     compiled_part,
     digest,
     entry_point,
-    generated_header,
     is_compiled,
     lane_vectors,
+    load_functions,
     load_module,
+    load_tables,
     module_name,
     pointer,
-    records,
     source_of,
+    vectors,
 )
 
-_TYPES = (scalar_types, function_types, contact_function_types, lane_vectors)
+_TYPES = (scalar_types, function_types, contact_function_types, vectors, lane_vectors)
 _WRITTEN_BY = digest(*(source_of(module) for module in _TYPES))
-_SIGNATURES = f"""
+_SIGNATURES = f"""import math
+
+import numpy as np
+
 from saltus.flow.lanes.function_types import *
 from saltus.taylor.lane_vectors import *
+from saltus.taylor.numba_types import by_reference
 from saltus.taylor.private_numba import cached_jit, inline_jit, jit, lean_jit, pointed_jit
-from saltus.taylor.references import by_reference
-# types and vectors of {_WRITTEN_BY}
+# types and vectors of {_WRITTEN_BY}, for {WIDTH} lanes
 """
 
 
@@ -82,14 +87,14 @@ def _driver_text(several: bool) -> str:
         several_contacts,
     )
     step = of_several if several else (one_contact,)
-    common = (memory_layout, kernel_layout, lane_layout, contact_side, records, lane_steps, meeting, sampling)
+    common = (memory_layout, kernel_layout, lane_layout, contact_side, load_tables, lane_steps, meeting, sampling)
     return _text(several, *common, *step, forcing_periods, driver)
 
 
 def _text(several: bool, *modules: ModuleType) -> str:
     """One source of the compiled parts of several files, for vectors of this machine's width."""
     types = "from saltus.flow.lanes.contact_function_types import *\n" if several else ""
-    return generated_header(_SIGNATURES + types) + "".join(compiled_part(module) for module in modules)
+    return _SIGNATURES + types + "".join(compiled_part(module) for module in modules)
 
 
 @cache
@@ -113,7 +118,7 @@ def load_helpers(several: bool = False) -> tuple[Any, ...]:
     """The functions that the driver calls for one lane: `lane_root`, `turning_range`, `scalar_motion`; with several contacts also
     `contacts_impact`."""
     names = ["lane_root", "turning_range", "scalar_motion"]
-    parts = [kernel_layout, lane_layout, records, roots, scalar_fallback, lane_state]
+    parts = [kernel_layout, lane_layout, load_tables, roots, scalar_fallback, lane_state]
     if several:
         names.append("contacts_impact")
         parts += [contact_layout, complementarity, contact_impacts, contacts_of_lane, contacts_handoff]
@@ -132,9 +137,7 @@ def load_lane_functions(trace: Trace) -> tuple[Slots, tuple[Any, ...]]:
         Compiling them would take minutes.
     """
     check_size(trace, lanes=True)
-    module = load_module("lane", generated_header(_SIGNATURES) + lane_functions_text(trace))
-    names = ("series", "impact", "field", "one_free")[: 4 if trace.several else 3]
-    return slots_of(trace), tuple(pointer(getattr(module, f"lane_{name}")) for name in names)
+    return slots_of(trace), tuple(load_functions("lane", lane_functions(trace)).values())
 
 
 @cache

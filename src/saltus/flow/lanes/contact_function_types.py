@@ -17,7 +17,7 @@ from saltus.flow.lanes.function_types import (
     TABLES,
     TURNING_RANGE,
 )
-from saltus.taylor import function_type, pointers
+from saltus.taylor import function_type, written_type
 
 _f, _i = types.float64, types.int64
 _f1, _f2, _f3 = (types.Array(_f, n, "C") for n in (1, 2, 3))
@@ -26,12 +26,11 @@ _i1, _i2, _i3 = (types.Array(_i, n, "C") for n in (1, 2, 3))
 LANES = types.Tuple((_i2, _f2, _f2, _f2, _f3, _i2, _i3))
 _SOLVER = types.Tuple((_f1, *4 * (_f2,), *12 * (_f1,), _f2))
 SPACE = types.Tuple((_f1, _f1, _i1, _f1, _i2, _SOLVER))
-with pointers():
-    _functions = (LANE_SERIES, LANE_IMPACT, LANE_FIELD, CONSTANTS, MATRICES, LANE_ONE_FREE)
-    CODE = types.Tuple([function_type(s) for s in _functions])
-    SCALAR = types.Tuple((function_type(ADVANCE_CONTACTS), CONTACT_MODEL))
-    SCALAR_MOTION = types.UniTuple(_i, 2)(_i, SCALAR, _i1, _i1, _f1, _i1, _f1, LANES, _f2, TABLES, _f1, _i1)
-    CONTACTS_IMPACT = _i(_i, _i, SCALAR, _i1, _i1, _f1, _f1, LANES, _f2, TABLES, SPACE)
-    _helpers = (LANE_ROOT, TURNING_RANGE, SCALAR_MOTION, CONTACTS_IMPACT)
-    HELPERS = types.Tuple([function_type(signature) for signature in _helpers])
+_functions = (LANE_SERIES, LANE_IMPACT, LANE_FIELD, CONSTANTS, MATRICES, LANE_ONE_FREE)
+CODE = types.Tuple([written_type(s) for s in _functions])
+SCALAR = types.Tuple((function_type(ADVANCE_CONTACTS), CONTACT_MODEL))
+SCALAR_MOTION = types.UniTuple(_i, 2)(_i, SCALAR, _i1, _i1, _f1, _i1, _f1, LANES, _f2, TABLES, _f1, _i1)
+CONTACTS_IMPACT = _i(_i, _i, SCALAR, _i1, _i1, _f1, _f1, LANES, _f2, TABLES, SPACE)
+_helpers = (LANE_ROOT, TURNING_RANGE, SCALAR_MOTION, CONTACTS_IMPACT)
+HELPERS = types.Tuple([function_type(signature) for signature in _helpers])
 RUN_LANES = types.void(CODE, SCALAR, HELPERS, _i1, _i1, _f1, _f1, JOBS, TABLES, RESULTS, _i1)

@@ -142,7 +142,7 @@ def run_ensemble(
 
 def compiled_lanes(system: System, run: Program, wanted: Wanted, kept: int) -> Lanes:
     """The compiled lanes of a system, with the settings for the samples that they keep of each trajectory."""
-    key = run.structure.module.__name__
+    key = run.structure.functions  # their addresses
     if key not in _functions:
         _functions[key] = load_lane_functions(run.trace)
     slots, functions = _functions[key]
@@ -161,14 +161,14 @@ def compiled_lanes(system: System, run: Program, wanted: Wanted, kept: int) -> L
     )
 
 
-_functions: dict[str, Any] = {}
+_functions: dict[tuple[int, ...], Any] = {}
 
 
 def _jobs(system: System, run: Program, inputs: Inputs, periods: float | None, duration: float | None, side: int) -> Jobs:
     """The trajectories in the arrays that the driver takes."""
     known = [path for path, _ in numbers(system)]
     columns = {known.index(path): np.broadcast_to(a, inputs.size) for path, a in inputs.parameters.items()}
-    states = _first_states(inputs, len(system.model.coordinates), run.structure.module.COLUMNS)
+    states = _first_states(inputs, len(system.model.coordinates), run.structure.sizes.columns)
     numbers_of, labels = np.zeros((inputs.size, len(JobNumber))), np.zeros((inputs.size, len(JobLabel)), dtype=np.int64)
     time, frequency = inputs.values["time"], inputs.values.get("load.frequency", system.load.frequency)
     length = None if frequency is None else 2.0 * math.pi / np.asarray(frequency, dtype=float)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 from saltus.flow.kernel.compiled import constants, motion_roots, one_free
 from saltus.flow.kernel.event_derivatives import saltation
 from saltus.flow.kernel.memory_layout import FIRST_PART, SERIES_LENGTH, LanePart, LaneSlot
-from saltus.taylor import RECORD_WIDTH, Case, Expr, Places, Rows, Trace, function_text, tape
+from saltus.flow.lanes import function_types
+from saltus.taylor import LANES, RECORD_WIDTH, Case, Expr, Function, Places, Rows, SeriesOf, Trace, tape
 
 
 @dataclass(frozen=True)
@@ -58,11 +61,16 @@ def slots_of(trace: Trace) -> Slots:
     )
 
 
-def lane_functions_text(trace: Trace) -> str:
-    """The source of `lane_series`, `lane_impact` and `lane_field`; for a model with several contacts also of `lane_one_free`."""
+def lane_functions(trace: Trace) -> list[Function]:
+    """`lane_series`, `lane_impact` and `lane_field`; for a model with several contacts also `lane_one_free`."""
     slots, known = slots_of(trace), constants(trace)
     functions = [_series(trace, slots, known), _impact(trace, slots, known), _field(trace, slots, known)]
-    return "".join([*functions, _one_free(trace, slots, known)] if trace.several else functions)
+    return [*functions, _one_free(trace, slots, known)] if trace.several else functions
+
+
+def _function(name: str, places: Places, content: Sequence[Any]) -> Function:
+    """A function of the lanes; its signature has its name in `function_types.py`."""
+    return Function(name, getattr(function_types, name.upper()), places, LANES, content)
 
 
 def _leaves(slots: Slots, time: LaneSlot, position: LanePart, velocity: LanePart) -> dict[str, tuple[str, int]]:
@@ -75,7 +83,7 @@ def _leaves(slots: Slots, time: LaneSlot, position: LanePart, velocity: LanePart
     return {op: ("m", int(slot)) for op, slot in (first | numbers).items()}
 
 
-def _series(trace: Trace, slots: Slots, known: dict[Expr, int]) -> str:
+def _series(trace: Trace, slots: Slots, known: dict[Expr, int]) -> Function:
     """`lane_series(m, order)`: the series of positions and velocities from the state, of the accelerations and of the margins.
 
     Positions and velocities have coefficients 0..order, the others 0..order - 1; the order is even, and at least LOWEST_ORDER.
@@ -88,12 +96,12 @@ def _series(trace: Trace, slots: Slots, known: dict[Expr, int]) -> str:
     targets = [*rows(LanePart.ACCELERATIONS, slots.own), *columns, *rows(LanePart.MARGINS, slots.stops)]
     positions, velocities = rows(LanePart.POSITIONS, slots.rows), rows(LanePart.VELOCITIES, slots.rows)
     margins = motion_roots(trace)[trace.gap is not None :]
-    content = [Rows(positions, velocities, targets, SERIES_LENGTH, any_order=False)]
+    layout = Rows(positions, velocities, targets, SERIES_LENGTH, any_order=False)
     places = Places(("m", "order"), _leaves(slots, LaneSlot.NOW, LanePart.POSITION, LanePart.VELOCITY))
-    return function_text("lane_series", places, "LANES", [*content, tape([*trace.acceleration, *margins], known, series=True)])
+    return _function("lane_series", places, SeriesOf(layout, tape([*trace.acceleration, *margins], known, series=True)))
 
 
-def _one_free(trace: Trace, slots: Slots, known: dict[Expr, int]) -> str:
+def _one_free(trace: Trace, slots: Slots, known: dict[Expr, int]) -> Function:
     """`lane_one_free(m, order)`: the same series if one coordinate is free, which is in row 0.
 
     The series of `OneFree.curved` are in the rows of the other coordinates, and the guards in the rows of margins.
@@ -102,7 +110,7 @@ def _one_free(trace: Trace, slots: Slots, known: dict[Expr, int]) -> str:
     leaves |= {"coordinate": ("m", int(LaneSlot.FREE_POSITION)), "velocity": ("m", int(LaneSlot.FREE_VELOCITY))}
     places, equations = Places(("m", "order"), leaves), one_free(trace)
     if equations is None:
-        return function_text("lane_one_free", places, "LANES", [])
+        return _function("lane_one_free", places, [])
     first = {part: ("m", slots.places[part]) for part in LanePart}
     guards = [("m", slots.places[LanePart.MARGINS] + i * SERIES_LENGTH) for i in range(len(equations.guards))]
     numbers = [("m", slots.places[LanePart.CONSTANT_GUARDS] + i) for i in range(len(equations.constant_guards))]
@@ -110,10 +118,10 @@ def _one_free(trace: Trace, slots: Slots, known: dict[Expr, int]) -> str:
     targets = [first[LanePart.ACCELERATIONS], *curved, *guards]
     state = [first[LanePart.POSITIONS]], [first[LanePart.VELOCITIES]]
     rows = Rows(*state, targets, SERIES_LENGTH, any_order=False, numbers=numbers)
-    return function_text("lane_one_free", places, "LANES", [rows, tape(equations.roots, known, series=True)])
+    return _function("lane_one_free", places, SeriesOf(rows, tape(equations.roots, known, series=True)))
 
 
-def _impact(trace: Trace, slots: Slots, known: dict[Expr, int]) -> str:
+def _impact(trace: Trace, slots: Slots, known: dict[Expr, int]) -> Function:
     """`lane_impact(m)`: the side, positions and velocities after an impact at the new state, the tangent's columns included.
 
     For a model with several contacts it fills only the mass matrix and E at the new state.
@@ -134,12 +142,12 @@ def _impact(trace: Trace, slots: Slots, known: dict[Expr, int]) -> str:
     return _at_new_state("lane_impact", slots, results, known)
 
 
-def _field(trace: Trace, slots: Slots, known: dict[Expr, int]) -> str:
+def _field(trace: Trace, slots: Slots, known: dict[Expr, int]) -> Function:
     """`lane_field(m)`: the accelerations at the new state, in the place of the velocities after an impact."""
     first = slots.places[LanePart.AFTER_VELOCITY]
     return _at_new_state("lane_field", slots, {("m", first + row): a for row, a in enumerate(trace.acceleration)}, known)
 
 
-def _at_new_state(name: str, slots: Slots, results: dict[tuple[str, int], Expr], known: dict[Expr, int]) -> str:
+def _at_new_state(name: str, slots: Slots, results: dict[tuple[str, int], Expr], known: dict[Expr, int]) -> Function:
     places = Places(("m",), _leaves(slots, LaneSlot.NEW_TIME, LanePart.NEW_POSITION, LanePart.NEW_VELOCITY))
-    return function_text(name, places, "LANES", [Case(tape(list(results.values()), known), list(results))])
+    return _function(name, places, [Case(tape(list(results.values()), known), list(results))])

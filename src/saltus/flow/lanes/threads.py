@@ -141,7 +141,7 @@ class Lanes:
         threads = max(1, min(threads, math.ceil(n / WIDTH)))  # starting a thread costs time even if it has no lanes
         ends = Ends(
             np.empty((n, jobs.states.shape[1])),
-            np.zeros((n, EndNumber.RATES + own + self.program.structure.module.COLUMNS)),
+            np.zeros((n, EndNumber.RATES + own + self.program.structure.sizes.columns)),
             np.empty((n, len(EndLabel)), dtype=np.int64),
             np.empty((n, self.kept, len(self.sampled))),
         )
@@ -174,7 +174,7 @@ class Lanes:
     @property
     def own(self) -> int:
         """The model's coordinates."""
-        return int(self.program.structure.module.OWN)
+        return self.program.structure.sizes.own
 
     def _work(self, jobs: Jobs, ends: Ends, waiting: Iterator[slice], lock: threading.Lock, control: np.ndarray) -> None:
         """Run chunk after chunk until there are none."""
@@ -204,24 +204,24 @@ class Lanes:
     def _arguments(self) -> tuple[Any, ...]:
         """The arguments that are the same in every call of the driver: functions, sizes, places and settings."""
         structure, trace = self.program.structure, self.program.trace
-        module, scalar = structure.module, self.program.model if self.several else structure.functions
+        counts, scalar = structure.sizes, self.program.model if self.several else structure.functions
         code = (*self.functions[:3], *structure.tables, *self.functions[3:])
         contacts = np.array([len(trace.signs), *trace.held, *trace.signs, *trace.rubbed], dtype=np.int64)
         sizes = np.concatenate([np.zeros(Size.CONTACTS, dtype=np.int64), contacts])
         given = {
-            Size.OWN: module.OWN,
+            Size.OWN: counts.own,
             Size.FRICTIONS: len(trace.rubbed),
-            Size.COLUMNS: module.COLUMNS,
-            Size.MARGINS: module.STOPS,
-            Size.SIDES: module.SIDES,
-            Size.CHECKED: module.STEEP,
+            Size.COLUMNS: counts.columns,
+            Size.MARGINS: counts.stops,
+            Size.SIDES: counts.sides,
+            Size.CHECKED: counts.steep,
             Size.RECORDS: self.slots.records,
-            Size.ONE_FREE: self.slots.guards is not None and not module.STEEP,
+            Size.ONE_FREE: self.slots.guards is not None and not counts.steep,
             Size.GUARDS: self.slots.guards or 0,
             Size.CONSTANT_GUARDS: self.slots.constant_guards,
             Size.ORDER: lane_order(self.tol),
             Size.SCALAR_ORDER: taylor_order(self.tol),
-            Size.WORKSPACE: module.ROWS,
+            Size.WORKSPACE: counts.rows,
             Size.KEPT: self.kept,
             Size.EXTREMA: self.extrema,
             Size.FROM_START: self.from_start,
