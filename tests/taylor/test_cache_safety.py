@@ -12,9 +12,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from saltus.taylor import cache
-from saltus.taylor.cache import cache_directory, load_module
-from saltus.taylor.private_numba import undamaged
+from saltus.taylor import cache, load_module, module_name
+from saltus.taylor.cache import cache_directory, undamaged
 
 SOURCE = """
 from numba import types
@@ -27,7 +26,7 @@ def doubled(x):
 COMPILED = (".nbc", ".nbi", ".bytecode")
 SCRIPT = f"""
 import logging; logging.basicConfig(format="%(message)s")
-from saltus.taylor.cache import load_module
+from saltus.taylor.kernels import load_module
 print(load_module("safety", {SOURCE!r}).doubled(3.0))
 """
 
@@ -51,12 +50,12 @@ def run(home, **more):
 
 def run_here(caplog):
     """The number and the remarks when this process loads the module from disk anew."""
-    sys.modules.pop(cache.module_name("safety", SOURCE), None)
+    sys.modules.pop(module_name("safety", SOURCE), None)
     caplog.clear()
     try:
         return load_module("safety", SOURCE).doubled(3.0), caplog.text
     finally:
-        sys.modules.pop(cache.module_name("safety", SOURCE), None)
+        sys.modules.pop(module_name("safety", SOURCE), None)
 
 
 def kept(home):
@@ -76,7 +75,7 @@ def test_a_new_folder_is_the_user_s_alone(home, umask):
             assert folder.stat().st_mode & 0o777 == 0o700
     finally:
         os.umask(before)
-        del sys.modules[cache.module_name("safety", SOURCE)]
+        del sys.modules[module_name("safety", SOURCE)]
 
 
 GROUPS = {100: ("users", []), 1000: ("me", []), 1001: ("me", ["me", "you"]), 0: ("root", [])}
@@ -144,7 +143,7 @@ def test_a_folder_of_another_user_is_not_used(home, monkeypatch):
 
 
 def test_another_text_under_the_name_of_a_source_is_not_run(home):
-    name = cache.module_name("safety", SOURCE)
+    name = module_name("safety", SOURCE)
     path = cache_directory() / f"{name.removeprefix('saltus_')}.py"
     path.write_text("raise SystemExit('planted')\n")
     assert load_module("safety", SOURCE).doubled(3.0) == 6.0
@@ -232,7 +231,7 @@ def test_any_flipped_bit_of_compiled_code_is_noticed(home, caplog):
             path.write_bytes(flipped)
             assert undamaged(str(path)) is None
             assert not path.exists()
-    del sys.modules[cache.module_name("safety", SOURCE)]
+    del sys.modules[module_name("safety", SOURCE)]
 
 
 def test_a_cache_that_was_moved_is_read_where_it_is(home):

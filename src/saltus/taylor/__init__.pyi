@@ -3,7 +3,7 @@ from .common_form import CommonForm
 from .derivatives import FREQUENCY, derivative_along, partial_derivative, tangent_leaves, time_derivative
 from .equations import equations_of, structure_key
 from .exact_algebra import Form, NoNormalForm, constant, constant_value, normal_form
-from .generated import Case, Function, SeriesOf, functions_text, load_functions
+from .generated import Case, SeriesOf, WrittenFunction, functions_text, load_functions
 from .graph import RECORD_WIDTH, Expr, differentiate, is_steep, number, ordered, substitute
 from .kernels import by_reference, cached_jit, compiled_part, inline_jit, is_compiled, jit, lean_jit, load_module, module_name
 from .lane_vectors import (
@@ -53,13 +53,13 @@ __all__ = [
     "CommonForm",
     "Expr",
     "Form",
-    "Function",
     "NoNormalForm",
     "Places",
     "Pointer",
     "Rows",
     "SeriesOf",
     "Trace",
+    "WrittenFunction",
     "absolute",
     "anchor",
     "bits",

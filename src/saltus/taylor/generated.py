@@ -47,7 +47,7 @@ class SeriesOf(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Function:
+class WrittenFunction:
     """A function of a structure: the series of a tape, or cases of an instant, of which only one that always holds has results.
 
     An instant is computed without fused multiply-adds.
@@ -149,7 +149,7 @@ def stack_of_cache_lines(function: Any, line: int) -> None:
 # --- text and machine code ---------------------------------------------------------------------------------------------------
 
 
-def functions_text(functions: Sequence[Function]) -> str:
+def functions_text(functions: Sequence[WrittenFunction]) -> str:
     """Functions as text, which is all that their code depends on besides `written_by`."""
     return "\n".join(map(repr, functions))
 
@@ -161,7 +161,7 @@ def written_by() -> str:
     return digest(*(source_of(module) for module in writers), machine_code.made_for())
 
 
-def llvm_text(functions: Sequence[Function]) -> str:
+def llvm_text(functions: Sequence[WrittenFunction]) -> str:
     """The functions as LLVM's text."""
     module = ir.Module("saltus")
     module.triple = binding.get_process_triple()
@@ -170,7 +170,7 @@ def llvm_text(functions: Sequence[Function]) -> str:
     return str(module)
 
 
-def load_functions(kind: str, functions: Sequence[Function]) -> dict[str, Pointer]:
+def load_functions(kind: str, functions: Sequence[WrittenFunction]) -> dict[str, Pointer]:
     """Pointers to functions by their names: loaded from the disk, or written and compiled first."""
     name = f"{kind}_{digest(functions_text(functions), written_by())}"
     if name not in _loaded:

@@ -55,13 +55,14 @@ def _private(module: str, name: str) -> Any:
         raise AttributeError(str(error)) from error
 
 
-def _njit(**options: Any) -> Callable[[Any], Any]:
+def _njit(within: bool = False, **options: Any) -> Callable[[Any], Any]:
     """numba's `njit` with saltus's options and, unless numba is used plainly, the given ones."""
 
     def decorated(function: Any) -> Any:
         if is_plain():
-            return njit(**OPTIONS | {name: options[name] for name in ("nogil",) if name in options})(function)
-        dispatcher = njit(**OPTIONS | options)(function)
+            return njit(**OPTIONS | {name: value for name, value in options.items() if not name.startswith("_")})(function)
+        more = {"pipeline_class": _linked_only()} if within else {}
+        dispatcher = njit(**OPTIONS | options | more)(function)
         template = dispatcher.get_call_template
         dispatcher.get_call_template = lambda args, kws: template(*_without_values(args, kws))
         return dispatcher
@@ -74,9 +75,47 @@ def _without_values(args: Any, kws: Any) -> tuple[Any, Any]:
     return tuple(map(types.unliteral, args)), {name: types.unliteral(kind) for name, kind in kws.items()}
 
 
-jit = _njit(_nrt=True, **WITHIN)
-lean_jit = _njit(**LEAN)
-inline_jit = _njit(**LEAN, forceinline=True)  # for functions that every step of the lanes calls
+@cache
+def _linked_only() -> Any:
+    """numba's compiler for functions that others of a kernel call: they become parts of its machine code and get none of their own.
+
+    numba would optimise each by itself, with all that it calls, and make machine code of it.
+    """
+    lowering = _private("numba.core.typed_passes", "NativeLowering")
+
+    class Linked(_private("numba.core.codegen", "JITCodeLibrary")):  # type: ignore[misc]
+        def _optimize_final_module(self) -> None:
+            pass
+
+        def _finalize_final_module(self) -> None:
+            self._finalized = True
+
+    @_private("numba.core.compiler_machinery", "register_pass")(mutates_CFG=True, analysis_only=False)  # as `NativeLowering`
+    class Linking(lowering):  # type: ignore[misc,valid-type]
+        _name = "saltus_linking"
+
+        def run_pass(self, state: Any) -> bool:
+            """Write the function into a library that is only linked; others find it by a key that nothing else has."""
+            state.library, state.flags.no_compile = Linked(state.targetctx.codegen(), state.func_id.func_qualname), True
+            mutated: bool = super().run_pass(state)
+            key = list[None]().append
+            state.targetctx.insert_user_function(key, state.cr.fndesc, [state.library])
+            state.cr = state.cr._replace(cfunc=key)
+            return mutated
+
+    class Compiler(_private("numba.core.compiler", "CompilerBase")):  # type: ignore[misc]
+        def define_pipelines(self) -> list[Any]:
+            """numba's own passes with another last step."""
+            made = _private("numba.core.compiler", "DefaultPassBuilder").define_nopython_pipeline(self.state)
+            made.passes = [(Linking if each is lowering else each, description) for each, description in made.passes]
+            return [made]
+
+    return Compiler
+
+
+jit = _njit(_nrt=True, within=True, **WITHIN)
+lean_jit = _njit(within=True, **LEAN)
+inline_jit = _njit(within=True, **LEAN, forceinline=True)  # for functions that every step of the lanes calls
 
 
 def _name_fields() -> None:

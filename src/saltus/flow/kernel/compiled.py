@@ -24,12 +24,12 @@ from saltus.taylor import (
     SCALAR,
     Case,
     Expr,
-    Function,
     Places,
     Pointer,
     Rows,
     SeriesOf,
     Trace,
+    WrittenFunction,
     compiled_part,
     digest,
     entry_point,
@@ -177,7 +177,7 @@ def load_structure(trace: Trace) -> Structure:
 # --- the functions of a structure ------------------------------------------------------------------------------------------
 
 
-def structure_functions(trace: Trace) -> list[Function]:
+def structure_functions(trace: Trace) -> list[WrittenFunction]:
     """A structure's functions; equal structures have equal functions, whatever their numbers."""
     known = constants(trace)
     impact = [x for x in (trace.next_side, trace.velocity_after) if x is not None] or [number(0.0)] * 2
@@ -196,9 +196,9 @@ def structure_functions(trace: Trace) -> list[Function]:
     ]
 
 
-def _function(name: str, places: Places, content: Sequence[Any]) -> Function:
+def _function(name: str, places: Places, content: Sequence[Any]) -> WrittenFunction:
     """A function of one motion; its signature has its name in `function_types.py`."""
-    return Function(name, getattr(function_types, name.upper()), places, SCALAR, content)
+    return WrittenFunction(name, getattr(function_types, name.upper()), places, SCALAR, content)
 
 
 def constants(trace: Trace) -> dict[Expr, int]:
@@ -241,7 +241,7 @@ def _geometry(trace: Trace) -> list[Expr]:
     return [trace.contact, *(substitute(trace.gap_rate, {Expr("side"): side}) for side in (1.0, -1.0))]
 
 
-def _series(trace: Trace, known: dict[Expr, int]) -> Function:
+def _series(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
     """The Taylor coefficients of the coordinates, velocities, accelerations, the gap and the margins from one state."""
     rows = range(len(trace.acceleration))
     gap = [] if trace.gap is None else [("g", 0)]
@@ -259,7 +259,7 @@ def _free(trace: Trace) -> dict[str, tuple[str, int]]:
     return {"slide": ("parameters", first), "free": ("parameters", first + len(trace.rubbed))}
 
 
-def _contact_series(trace: Trace, known: dict[Expr, int]) -> Function:
+def _contact_series(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
     """The Taylor coefficients in the time of the gap's second derivative at rest at contact."""
     places = Places(("t", "origin", "side", "env", "piece", "b", "w", "order"), LEAVES)
     if trace.contact_acceleration is None:
@@ -268,27 +268,27 @@ def _contact_series(trace: Trace, known: dict[Expr, int]) -> Function:
     return _function("contact_series", places, SeriesOf(layout, tape([trace.contact_acceleration], known, series=True)))
 
 
-def _matrices(trace: Trace, known: dict[Expr, int]) -> Function:
+def _matrices(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
     """The mass matrix, E, the positions of the contacts and the speeds of the grounds at a state, one after the other."""
     roots = trace.contact_numbers
     places = Places(("env", "piece", "state", "out"), ENV | HERE)
     return _function("matrices", places, [Case(tape(roots, known), [("out", i) for i in range(len(roots))])])
 
 
-def _matrix_slopes(trace: Trace, known: dict[Expr, int]) -> Function:
+def _matrix_slopes(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
     """The derivatives, along each column of the tangent, of the numbers that `matrices` fills; one column after the other."""
     roots, places = event_derivatives.number_slopes(trace), Places(("env", "piece", "state", "out"), ENV | HERE)
     cases = [Case(tape(roots, known), [("out", i) for i in range(len(roots))])] if roots else []
     return _function("matrix_slopes", places, cases)
 
 
-def _at_impact(name: str, arguments: tuple[str, ...], roots: list[Expr], known: dict[Expr, int]) -> Function:
+def _at_impact(name: str, arguments: tuple[str, ...], roots: list[Expr], known: dict[Expr, int]) -> WrittenFunction:
     """A function that returns the values of expressions at an instant, for the velocity `v0`."""
     places = Places(arguments, LEAVES | {"velocity": ("v0", 0)})
     return _function(name, places, [Case(tape(roots, known), [None] * len(roots))])
 
 
-def _tangent(trace: Trace, known: dict[Expr, int]) -> Function:
+def _tangent(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
     """The function that transforms the tangent's columns, in the kernel's state (see `State`), at each kind of event."""
     count, first = len(trace.acceleration), State.COORDINATES.value
     starts = {"coordinate": first, "velocity": first + count, "shift": first + 2 * count}
@@ -301,7 +301,7 @@ def _tangent(trace: Trace, known: dict[Expr, int]) -> Function:
     return _function("tangent", places, cases)
 
 
-def _table(name: str, places: Places, roots: list[Expr], known: dict[Expr, int]) -> Function:
+def _table(name: str, places: Places, roots: list[Expr], known: dict[Expr, int]) -> WrittenFunction:
     """A function that fills its last argument with the values of expressions of the parameters."""
     targets = [(places.arguments[-1], i) for i in range(len(roots))]
     return _function(name, places, [Case(tape(roots, known), targets)])

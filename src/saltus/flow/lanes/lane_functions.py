@@ -11,7 +11,7 @@ from saltus.flow.kernel.compiled import constants, motion_roots, one_free
 from saltus.flow.kernel.event_derivatives import saltation
 from saltus.flow.kernel.memory_layout import FIRST_PART, SERIES_LENGTH, LanePart, LaneSlot
 from saltus.flow.lanes import function_types
-from saltus.taylor import LANES, RECORD_WIDTH, Case, Expr, Function, Places, Rows, SeriesOf, Trace, tape
+from saltus.taylor import LANES, RECORD_WIDTH, Case, Expr, Places, Rows, SeriesOf, Trace, WrittenFunction, tape
 
 
 @dataclass(frozen=True)
@@ -61,16 +61,16 @@ def slots_of(trace: Trace) -> Slots:
     )
 
 
-def lane_functions(trace: Trace) -> list[Function]:
+def lane_functions(trace: Trace) -> list[WrittenFunction]:
     """`lane_series`, `lane_impact` and `lane_field`; for a model with several contacts also `lane_one_free`."""
     slots, known = slots_of(trace), constants(trace)
     functions = [_series(trace, slots, known), _impact(trace, slots, known), _field(trace, slots, known)]
     return [*functions, _one_free(trace, slots, known)] if trace.several else functions
 
 
-def _function(name: str, places: Places, content: Sequence[Any]) -> Function:
+def _function(name: str, places: Places, content: Sequence[Any]) -> WrittenFunction:
     """A function of the lanes; its signature has its name in `function_types.py`."""
-    return Function(name, getattr(function_types, name.upper()), places, LANES, content)
+    return WrittenFunction(name, getattr(function_types, name.upper()), places, LANES, content)
 
 
 def _leaves(slots: Slots, time: LaneSlot, position: LanePart, velocity: LanePart) -> dict[str, tuple[str, int]]:
@@ -83,7 +83,7 @@ def _leaves(slots: Slots, time: LaneSlot, position: LanePart, velocity: LanePart
     return {op: ("m", int(slot)) for op, slot in (first | numbers).items()}
 
 
-def _series(trace: Trace, slots: Slots, known: dict[Expr, int]) -> Function:
+def _series(trace: Trace, slots: Slots, known: dict[Expr, int]) -> WrittenFunction:
     """`lane_series(m, order)`: the series of positions and velocities from the state, of the accelerations and of the margins.
 
     Positions and velocities have coefficients 0..order, the others 0..order - 1; the order is even, and at least LOWEST_ORDER.
@@ -101,7 +101,7 @@ def _series(trace: Trace, slots: Slots, known: dict[Expr, int]) -> Function:
     return _function("lane_series", places, SeriesOf(layout, tape([*trace.acceleration, *margins], known, series=True)))
 
 
-def _one_free(trace: Trace, slots: Slots, known: dict[Expr, int]) -> Function:
+def _one_free(trace: Trace, slots: Slots, known: dict[Expr, int]) -> WrittenFunction:
     """`lane_one_free(m, order)`: the same series if one coordinate is free, which is in row 0.
 
     The series of `OneFree.curved` are in the rows of the other coordinates, and the guards in the rows of margins.
@@ -121,7 +121,7 @@ def _one_free(trace: Trace, slots: Slots, known: dict[Expr, int]) -> Function:
     return _function("lane_one_free", places, SeriesOf(rows, tape(equations.roots, known, series=True)))
 
 
-def _impact(trace: Trace, slots: Slots, known: dict[Expr, int]) -> Function:
+def _impact(trace: Trace, slots: Slots, known: dict[Expr, int]) -> WrittenFunction:
     """`lane_impact(m)`: the side, positions and velocities after an impact at the new state, the tangent's columns included.
 
     For a model with several contacts it fills only the mass matrix and E at the new state.
@@ -142,12 +142,12 @@ def _impact(trace: Trace, slots: Slots, known: dict[Expr, int]) -> Function:
     return _at_new_state("lane_impact", slots, results, known)
 
 
-def _field(trace: Trace, slots: Slots, known: dict[Expr, int]) -> Function:
+def _field(trace: Trace, slots: Slots, known: dict[Expr, int]) -> WrittenFunction:
     """`lane_field(m)`: the accelerations at the new state, in the place of the velocities after an impact."""
     first = slots.places[LanePart.AFTER_VELOCITY]
     return _at_new_state("lane_field", slots, {("m", first + row): a for row, a in enumerate(trace.acceleration)}, known)
 
 
-def _at_new_state(name: str, slots: Slots, results: dict[tuple[str, int], Expr], known: dict[Expr, int]) -> Function:
+def _at_new_state(name: str, slots: Slots, results: dict[tuple[str, int], Expr], known: dict[Expr, int]) -> WrittenFunction:
     places = Places(("m",), _leaves(slots, LaneSlot.NEW_TIME, LanePart.NEW_POSITION, LanePart.NEW_VELOCITY))
     return _function(name, places, [Case(tape(list(results.values()), known), list(results))])
