@@ -52,10 +52,6 @@ MAY_IMPORT = {
     "cli": {"systems", "theory", "flow", "taylor", "orbits", "attractors", "sweep", "studies", "plots", "config"},
 }
 TEXTS = {f"saltus.taylor.{name}" for name in ("lane_vectors", "load_tables", "vectors")}  # parts of the lanes' kernels
-    "saltus.taylor.lane_vectors",
-    "saltus.taylor.load_tables",
-    "saltus.taylor.vectors",
-}  # whose text becomes a part of the lanes' kernels
 HEAVY = (
     *("scipy", "numba", "xarray", "matplotlib", "h5netcdf", "zarr", "distributed"),
     *("saltus.flow", "saltus.sweep", "saltus_paper"),

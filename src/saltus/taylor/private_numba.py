@@ -77,7 +77,7 @@ def _without_values(args: Any, kws: Any) -> tuple[Any, Any]:
 
 @cache
 def _linked_only() -> Any:
-    """numba's compiler for functions that others of a kernel call: they become parts of its machine code and get none of their own.
+    """numba's compiler for functions that others of a kernel call: they become parts of its machine code and get none.
 
     numba would optimise each by itself, with all that it calls, and make machine code of it.
     """
