@@ -1,29 +1,23 @@
 """Files that are complete or not there, and that notice when they are damaged.
 
 Every output is made in memory, written to a file beside its place, brought to the disk and moved there. A netCDF file ends with a
-checksum of all its bytes, after the part that HDF5 reads, so that it is checked before HDF5 opens it. HDF5 reads in a process of
-its own, as a forged file may have a valid checksum, and errors in it can crash HDF5 or keep it busy for ever.
+checksum of all its bytes, after the part that HDF5 reads, so that it is checked before HDF5 opens it.
 """
 
 from __future__ import annotations
 
-import atexit
 import contextlib
 import hashlib
 import io
 import json
 import os
-import pickle
-import signal
-import subprocess
 import sys
 import tempfile
-import threading
 import time
 import traceback
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import IO, Any, cast
+from typing import IO, Any
 
 from saltus.checks import check_memory
 from saltus.errors import ParameterError, shown
@@ -33,10 +27,7 @@ STALE = 60.0  # s; without locks, a half-written file that was not touched for s
 COPIES = 2  # the number of copies of a file's bytes that reading it makes
 HEAD, TAIL = b"\nsha256 of the bytes before: ", b" (saltus)\n"  # of the checksum: wiping out 64 bytes leaves one of them
 UNCHECKED = "has no checksum (saltus writes one behind each file), so that damage to its numbers cannot be excluded"
-SLOWEST_READ = 1e6  # bytes/s, after LONGEST_OPEN s: if HDF5 takes longer, it is lost in a damaged file
-LONGEST_OPEN = 120.0  # s; many times the time that opening takes on a busy machine
 HDF5 = b"\x89HDF\r\n\x1a\n"  # the first bytes of its files
-MOST_LINKS, MOST_ATTRIBUTES = 3000, 10_000  # with more, a netCDF file takes ten seconds to open; Fig. 9 has 828 and 4324
 END_OF_FILE = {0: 40, 1: 44, 2: 28, 3: 28}  # where HDF5's superblock holds the file's length, by its version
 
 
@@ -172,23 +163,18 @@ def parsed_json(text: str | bytes) -> Any:
 def read_dataset(path: Path | str) -> Any:
     """The Dataset or DataTree in a netCDF file, in memory; its checksum is compared before HDF5 reads it.
 
-    A file without a checksum, which another program has written, is `UNCHECKED`; it is read if a separate process can read it.
+    A file without a checksum, which another program has written, is `UNCHECKED`.
 
     Raises
     ------
     ParameterError
         There is no such file, it is damaged, or it is no netCDF file.
     """
-    path = Path(path)
-    content = checked_content(path)
-    return _read_elsewhere(path, content) if HDF5 in content else _in_memory(path, content)
-
-
-def _in_memory(path: Path, content: bytes) -> Any:
     import xarray
 
+    path = Path(path)
+    content = checked_content(path)
     try:
-        _check_links(path, content)
         with xarray.open_datatree(io.BytesIO(content), engine="h5netcdf", phony_dims="access") as tree:
             variables = [variable for node in tree.subtree for variable in node.variables.values()]
             size = float(sum(variable.nbytes for variable in variables))
@@ -205,95 +191,6 @@ def _in_memory(path: Path, content: bytes) -> Any:
     for node in tree.subtree:
         node.set_close(None)  # the file is closed, and a handle to it need not be sent to other processes
     return tree if tree.children else tree.to_dataset()
-
-
-def _check_links(path: Path, content: bytes) -> None:
-    """Refuse a file that would take minutes or for ever to open, such as one with a group inside itself, or has links outside."""
-    import h5py
-
-    with h5py.File(io.BytesIO(content)) as file:
-        links, attributes, groups = 0, 0, [file["/"]]
-        while groups:
-            group = groups.pop()
-            links, attributes = links + len(group), attributes + len(group.attrs)
-            if links > MOST_LINKS or attributes > MOST_ATTRIBUTES:
-                most = f"{MOST_LINKS} groups and variables and {MOST_ATTRIBUTES} attributes"
-                raise ParameterError(f"{path} is no result of saltus: it has more than {most}, or a group that contains itself")
-            for name in group:
-                if not isinstance(group.get(name, getlink=True), h5py.HardLink):
-                    raise ParameterError(f"{path} is no result of saltus: it has a link to another place or file, {name!r:.60}")
-                found = group[name]
-                if isinstance(found, h5py.Group):
-                    groups.append(found)
-                else:
-                    attributes += len(found.attrs)
-
-
-def _read_elsewhere(path: Path, content: bytes) -> Any:
-    """The result of `_in_memory` in a separate process: bytes that crash HDF5, or keep it busy for ever, stop only that process.
-
-    The process serves all files that this one reads, as it takes most of a second to start.
-    """
-    with _reading:
-        reader = _readers.get(os.getpid())
-        if reader is None or reader.poll() is not None:
-            reader = _readers[os.getpid()] = _begun_reader()
-        late = threading.Timer(LONGEST_OPEN + len(content) / SLOWEST_READ, reader.kill)
-        late.daemon = True
-        late.start()
-        try:
-            pickle.dump((path, content), cast(IO[bytes], reader.stdin))
-            cast(IO[bytes], reader.stdin).flush()
-            answer = pickle.load(cast(IO[bytes], reader.stdout))
-        except (OSError, EOFError, pickle.UnpicklingError):
-            timed_out = late.finished.is_set()
-            what = "HDF5 does not come to the end of it" if timed_out else "it stops the process that reads it"
-            raise ParameterError(f"{path} is damaged: {what}; compute it again") from None
-        except BaseException:  # after an interruption the answer is not needed any more
-            reader.kill()
-            raise
-        finally:
-            late.cancel()
-    if isinstance(answer, ParameterError):
-        raise answer
-    return answer
-
-
-_readers: dict[int, subprocess.Popen[bytes]] = {}  # by the id of the process that asks, as a forked process needs its own
-_reading = threading.Lock()
-
-
-def _begun_reader() -> subprocess.Popen[bytes]:
-    """A process that runs `serve_files` with the import path of this process, and ends with it."""
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(place for place in sys.path if place)}
-    command = [sys.executable, "-P", "-c", "from saltus.files import serve_files; serve_files()"]
-    pipe = subprocess.PIPE
-    reader = subprocess.Popen(command, env=environment, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL)
-    atexit.register(_end_reader, reader)
-    return reader
-
-
-def _end_reader(reader: subprocess.Popen[bytes]) -> None:
-    reader.kill()
-    reader.communicate()
-
-
-def serve_files() -> None:
-    """Read what comes in at the standard input, file after file, until it ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches every process of a terminal; this one ends with its parent
-    answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # keeps what a library prints out of the answers
-    while True:
-        try:
-            path, content = pickle.load(sys.stdin.buffer)
-        except EOFError:
-            return
-        try:
-            answer = _in_memory(path, content)
-        except ParameterError as error:
-            answer = ParameterError(str(error), error.parameter)
-        pickle.dump(answer, answers)
-        answers.flush()
 
 
 @contextlib.contextmanager

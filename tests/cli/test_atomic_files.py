@@ -161,31 +161,6 @@ def test_a_file_that_has_lost_its_checksum_with_its_last_data_is_noticed(tmp_pat
             read_dataset(path)
 
 
-@pytest.mark.parametrize(
-    ("end", "limit", "sentence"),
-    [
-        ("os.kill(os.getpid(), 11)", 60.0, "it stops the process that reads it"),
-        ("time.sleep(99)", 1.0, "HDF5 does not come to the end of it"),
-    ],
-)
-@pytest.mark.parametrize("forged", [False, True])
-def test_a_file_that_ends_or_holds_the_process_that_reads_it_is_told(tmp_path, monkeypatch, end, limit, sentence, forged):
-    """As libhdf5 may do with damage that no checksum tells, or of which somebody has made the checksum too."""
-    if forged:
-        write_dataset(tmp_path / "foreign.nc", small())
-    else:
-        small().to_netcdf(tmp_path / "foreign.nc", engine="h5netcdf")
-    (tmp_path / "h5netcdf").mkdir()
-    (tmp_path / "h5netcdf" / "__init__.py").write_text(f"import os, time\n{end}\n")
-    monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
-    monkeypatch.setattr(files, "_readers", {})
-    monkeypatch.setattr(files, "LONGEST_OPEN", limit)
-    with pytest.raises(ParameterError, match=rf"foreign\.nc is damaged: {sentence}; compute it again"):
-        read_dataset(tmp_path / "foreign.nc")
-    monkeypatch.undo()
-    assert read_dataset(write_dataset(tmp_path / "next.nc", small())).identical(small())  # by another process
-
-
 @pytest.mark.parametrize("size", [0, 1, 100, 2000, -1, -60, -200])
 def test_a_cut_file_is_told(tmp_path, size):
     path = write_dataset(tmp_path / "a.nc", small())

@@ -1,16 +1,12 @@
 """`saltus plot`: a picture of every kind of result again, and what is no result."""
 
-import resource
 import sys
-import time
 
-import h5py
 import numpy as np
 import pytest
 import xarray
 
 from saltus.config import open_result
-from saltus.files import MOST_ATTRIBUTES, MOST_LINKS
 from saltus.sweep import Plan, Variable, run
 from saltus.sweep import store_files as files
 
@@ -55,39 +51,6 @@ def test_numbers_that_no_axis_can_hold_are_refused(refused, tmp_path):
     netcdf(tmp_path / "huge.nc", {"kind": "motion"}, theta=("time", [0.0, -1e308, 1e308]))
     sentence = refused("plot", tmp_path / "huge.nc")
     assert sentence == f"saltus: {tmp_path / 'huge.nc'} cannot be drawn: theta has numbers above 1e+100 in size"
-
-
-def hostile(path, kind):
-    """An HDF5 file with a group inside itself, with more groups, variables or attributes than any result, or with links."""
-    with h5py.File(path, "w") as file:
-        if kind == "loop":
-            file["again"] = file["/"]
-        elif kind == "inner loop":
-            group = file.create_group("a")
-            group.create_group("b")["up"] = group
-        elif kind == "deep":
-            group = file
-            for _ in range(4000):
-                group = group.create_group("g")
-        elif kind in ("soft", "external"):
-            file["there"] = h5py.SoftLink("/") if kind == "soft" else h5py.ExternalLink("other.nc", "/")
-        many = {"groups": MOST_LINKS, "variables": MOST_LINKS, "attributes": MOST_ATTRIBUTES}
-        for i in range(many[kind] + 1 if kind in many else 0):
-            if kind == "attributes":  # in many groups: writing n of one group takes n^2
-                file.require_group(f"g{i // 500}").attrs[f"a{i}"] = 1.0
-            elif kind == "groups":
-                file.create_group(f"g{i}")
-            else:
-                file[f"v{i}"] = 1.0
-
-
-@pytest.mark.parametrize("kind", ["loop", "inner loop", "deep", "groups", "variables", "attributes", "soft", "external"])
-def test_a_file_that_would_be_opened_for_minutes_is_refused_at_once(kind, refused, tmp_path):
-    hostile(tmp_path / "hostile.nc", kind)
-    begun = time.process_time(), resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime  # a process of its own reads it first
-    sentence = refused("plot", tmp_path / "hostile.nc")
-    assert time.process_time() - begun[0] + resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - begun[1] < 10.0
-    assert "hostile.nc is no result of saltus: it has " in sentence
 
 
 def test_what_is_no_result_is_told(refused, tmp_path):

@@ -35,7 +35,7 @@ class Study:
     asks
         The other questions, in the order of the file.
     source
-        The text of the file, with the line of each key.
+        The file.
 
     Examples
     --------
@@ -130,7 +130,7 @@ def load_study(path: Path | str, *, questions: bool = True) -> Study:
     Raises
     ------
     ParameterError
-        An error in the file, in one sentence with the file, the line and the dotted key.
+        An error in the file, in one sentence with the file and the dotted key.
 
     Examples
     --------
