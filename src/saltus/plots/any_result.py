@@ -9,23 +9,15 @@ from typing import Any
 from saltus.errors import ParameterError, shown
 from saltus.notebook import show_below_cell
 from saltus.plots.attractors import draw_attractors
-from saltus.plots.backbone import draw_backbone
-from saltus.plots.basin_boundary import draw_uncertainty, draw_wada
-from saltus.plots.basins import draw_basins
-from saltus.plots.chaotic_bands import draw_chaotic_bands
+from saltus.plots.basins import draw_basins, draw_uncertainty, draw_wada
+from saltus.plots.chaos import draw_chaotic_bands, draw_exponents, draw_exponents_along, draw_verdict
 from saltus.plots.chart import draw_stability_chart
 from saltus.plots.conventions import SINGLE_COLUMN, axes_or_new, figure_of, style
-from saltus.plots.curves import draw_attractors_along, draw_branch, draw_special_curve
+from saltus.plots.curves import draw_attractors_along, draw_backbone, draw_branch, draw_cascade, draw_search, draw_special_curve
 from saltus.plots.diagram import draw_diagram
-from saltus.plots.ensembles import draw_ensemble
-from saltus.plots.exponents import draw_exponents, draw_exponents_along
-from saltus.plots.manifolds import draw_manifold, draw_separatrix
-from saltus.plots.motion import draw_motion
-from saltus.plots.orbits_found import draw_cascade, draw_search
-from saltus.plots.plane import draw_plane
-from saltus.plots.sensitivities import draw_sensitivities
-from saltus.plots.sweep import draw_sweep
-from saltus.plots.verdict import draw_verdict
+from saltus.plots.ensembles import draw_ensemble, draw_sweep
+from saltus.plots.motion import draw_motion, draw_sensitivities
+from saltus.plots.plane import draw_manifold, draw_plane, draw_separatrix
 
 DRAWINGS: dict[str, Callable[..., Any]] = {
     "attractors": draw_attractors,

@@ -1,4 +1,4 @@
-"""Basins of attraction: the attractor to which each initial state leads, as colours, with the curves where they meet."""
+"""Basins of attraction: the attractor to which each initial state leads, the curves where they meet, measures of these."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patheffects import Normal, Stroke
+from matplotlib.ticker import FormatStrFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from saltus.plots.attractor_marks import (
+from saltus.plots.attractors import (
     MOST_NAMED,
     UNDECIDED_COLOUR,
     attractor_colours,
@@ -20,8 +21,7 @@ from saltus.plots.attractor_marks import (
     steady,
 )
 from saltus.plots.axis_names import unit_in_brackets
-from saltus.plots.conventions import INK, SINGLE_COLUMN, axes_or_new
-from saltus.plots.drawing import drawing
+from saltus.plots.conventions import INK, LIMIT_LINE, SINGLE_COLUMN, STABLE, STABLE_LINE, axes_or_new, drawing
 from saltus.plots.marks import cell_edges
 
 BOUNDARY: dict[str, Any] = {"color": INK, "linewidth": 0.7, "zorder": 4}
@@ -83,3 +83,42 @@ def _paint(ax: Any, dataset: Any, plane: tuple[str, str], colours: dict[int, Any
 
 def _percent(share: float) -> str:
     return f"{100 * share:.3g} %" if share == 0.0 or share >= 1e-3 else "< 0.1 %"
+
+
+@drawing
+def draw_uncertainty(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
+    """Draw the share of uncertain states over the distance, on logarithmic axes, with the power law that was fitted."""
+    ax = axes_or_new(ax, width, 0.75 * width)
+    distance, share = dataset["distance"].values, dataset["share"].values
+    alpha, error = float(dataset.attrs["alpha"]), float(dataset.attrs["error"])
+    known = share > 0.0
+    ax.loglog(distance[known], share[known], ls="none", marker="o", ms=4.0, mfc="white", mec=INK, label="grid")
+    if np.isfinite(alpha) and known.any():
+        middle = np.exp(np.mean(np.log(share[known]) - alpha * np.log(distance[known])))
+        label = rf"$\varepsilon^\alpha$, $\alpha={alpha:.3f}\pm{error:.3f}$"
+        ax.loglog(distance, middle * distance**alpha, label=label, **STABLE_LINE)
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(FormatStrFormatter("%g"))
+        axis.set_minor_formatter(NullFormatter())
+    ax.set_xlabel(r"distance $\varepsilon$ (cells)")
+    ax.set_ylabel(r"share $f(\varepsilon)$ of uncertain states")
+    ax.legend(loc="best")
+    return ax
+
+
+@drawing
+def draw_wada(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
+    """Draw the share of the boundary cells that have all basins within a radius, and the shares from which a verdict follows."""
+    ax = axes_or_new(ax, width, 0.75 * width)
+    ax.plot(dataset["radius"].values, dataset["share"].values, color=STABLE, marker="o", ms=4.0, lw=0.9, label="boundary cells")
+    for name, label in (("agrees", "agrees with Wada above"), ("fails", "does not below")):
+        style = {**LIMIT_LINE, "linestyle": "-" if name == "agrees" else (0, (1, 1.2))}
+        ax.axhline(float(dataset.attrs[name]), label=label, **style)
+    ax.set_ylim(-0.03, 1.03)
+    ax.set_xlabel("radius (cells)")
+    ax.set_ylabel("share with all basins within the radius")
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    ax.set_title(f"{np.size(dataset.attrs['labels'])} basins, verdict: {dataset.attrs['verdict']}", loc="left", pad=4)
+    ax.legend(loc="best")
+    return ax

@@ -10,12 +10,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from functools import wraps
-from typing import Any, ParamSpec, TypeVar
+from inspect import signature
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+
+from saltus.checks import check_number
+from saltus.errors import ParameterError, SaltusError, shown
+from saltus.public_functions import answered
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -150,3 +155,32 @@ DASHES: tuple[Any, ...] = ("-", (0, (6, 1.5)), (0, (3, 1.2)), (0, (5, 1.2, 1, 1.
 def panel_label(ax: Any, label: str) -> None:
     """Name a panel `(label)` above its upper left corner."""
     ax.set_title(f"$({label})$", loc="left", pad=4)
+
+
+NARROWEST, WIDEST = 10.0, 2000.0  # mm, of a picture: from a stamp to the widest poster
+
+
+def drawing(draw: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[Any, P], R]:
+    """A decorator of functions that draw a dataset in the conventions: arguments of a wrong kind are refused by their names.
+
+    Users can change datasets: if one lacks something, or its arrays do not fit one another, the error of NumPy or Matplotlib is
+    turned into a sentence.
+    """
+    name, drawn = next(iter(signature(draw).parameters)), styled(draw)
+
+    @answered
+    @wraps(draw)
+    def inside(dataset: Any, /, *given: P.args, **named: P.kwargs) -> R:
+        if not hasattr(dataset, "attrs") or not hasattr(dataset, "data_vars"):
+            raise ParameterError(f"{name} must be a Dataset or a DataTree, got {shown(dataset)}", name)
+        if named.get("width") is not None:
+            check_number("width", named["width"], at_least=NARROWEST, at_most=WIDEST, unit="mm")
+        try:
+            return drawn(dataset, *given, **named)
+        except (SaltusError, OSError, MemoryError):
+            raise
+        except Exception as error:
+            said = " ".join(f"{type(error).__name__}: {error}".split())
+            raise ParameterError(f"{name} cannot be drawn by {draw.__name__} ({said:.150})", name) from error
+
+    return inside

@@ -1,4 +1,4 @@
-"""Curves of one result each: a branch of orbits, a curve of special points, the attractors along a parameter."""
+"""Curves over a parameter: a branch, a curve of special points, a backbone, attractors; the orbits of a search, and a cascade."""
 
 from __future__ import annotations
 
@@ -6,12 +6,26 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 
-from saltus.branch_lines import smooth_lines
-from saltus.plots.attractor_marks import attractor_colours
-from saltus.plots.axis_names import parameter_name, quantity_name, unit_in_brackets
-from saltus.plots.conventions import INK, SINGLE_COLUMN, axes_or_new, marks_of, outside_legend
-from saltus.plots.drawing import drawing
+from saltus.plots.attractors import attractor_colours
+from saltus.plots.axis_names import parameter_name, peak, quantity_name, symbol, unit_in_brackets
+from saltus.plots.branch_cuts import smooth_lines
+from saltus.plots.conventions import (
+    DOUBLE_COLUMN,
+    INK,
+    LIMIT_LINE,
+    SINGLE_COLUMN,
+    STABLE,
+    STABLE_LINE,
+    UNSTABLE,
+    axes_or_new,
+    drawing,
+    marks_of,
+    new_figure,
+    outside_legend,
+)
 from saltus.plots.response import MARK_NAMES, MARKS, line_handles, line_style
 
 RESTS: dict[str, dict[str, Any]] = {"RL": {"marker": "x", "markersize": 3.4}, "CH": {"marker": "+", "markersize": 4.4}}
@@ -69,4 +83,85 @@ def draw_attractors_along(dataset: Any, *, ax: Axes | None = None, width: float 
     ax.set_xlabel(parameter_name(dataset.attrs["path"]))
     ax.set_ylabel(f"{quantity_name(dataset, 'amplitude')}{unit_in_brackets(dataset['amplitude'])}")
     ax.legend(loc="best")
+    return ax
+
+
+FEIGENBAUM = 4.669201609102990  # the limit of the ratios of a cascade
+SETTLED: dict[str, Any] = {"color": INK, "linestyle": "none", "marker": "+", "markersize": 5.0, "markeredgewidth": 0.6}
+FACES = {True: ("stable orbit", STABLE, STABLE, "o"), False: ("unstable orbit", "white", UNSTABLE, "s")}
+
+
+@drawing
+def draw_search(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * SINGLE_COLUMN) -> Axes:
+    """Draw the amplitudes of the orbits of `search_orbits`, stable ones filled, unstable ones open; returns `ax`.
+
+    Beside a mark is the period, if it is not 1; crosses are the orbits on which simulated motions have settled.
+    """
+    ax = axes_or_new(ax, width, 0.62 * width)
+    x, y = dataset["parameter"].values, dataset["amplitude"].values
+    stable = dataset["stable"].values.astype(bool)
+    for is_stable, (label, face, edge, marker) in FACES.items():
+        here = stable == is_stable
+        if here.any():
+            ax.plot(x[here], y[here], ls="none", marker=marker, ms=4.0, mfc=face, mec=edge, mew=0.8, label=label)
+    for place, height, period in zip(x, y, dataset["period"].values, strict=True):
+        if period > 1:
+            ax.annotate(str(period), (place, height), (4, 2), textcoords="offset points", fontsize=7)
+    settled = dataset["settled_parameter"].values, dataset["settled_amplitude"].values
+    if settled[0].size:
+        ax.plot(*settled, label="direct simulation", zorder=4, **SETTLED)
+    ax.set_ylim(0.0, 1.08 * max([*y, *settled[1]], default=1.0))
+    ax.set_xlabel(parameter_name(dataset.attrs["path"]))
+    ax.set_ylabel(f"${peak(dataset.attrs['coordinate'])}${unit_in_brackets(dataset['amplitude'])}")
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend(loc="best")
+    return ax
+
+
+@drawing
+def draw_cascade(dataset: Any, *, ax: Axes | None = None, figure: Figure | None = None) -> Any:
+    """Draw a cascade of period doublings: their parameters, the ratios of successive distances and the limit; returns both axes.
+
+    Into given axes only the parameters are drawn.
+    """
+    if ax is not None:
+        return _draw_doublings(ax, dataset)
+    figure = new_figure(DOUBLE_COLUMN, 68.0) if figure is None else figure
+    left, right = figure.subplots(1, 2)
+    _draw_doublings(left, dataset)
+    periods, ratios = dataset["period"].values, dataset["ratio"].values
+    right.axhline(FEIGENBAUM, label=f"limit {FEIGENBAUM:.4f}", **LIMIT_LINE)
+    right.plot(periods[: len(ratios)], ratios, marker="s", ms=4.0, mfc="white", **STABLE_LINE)
+    right.set_ylabel("ratio of successive distances")
+    right.legend(loc="best")
+    _name_periods(right, periods)
+    return np.array([left, right])
+
+
+def _draw_doublings(ax: Axes, dataset: Any) -> Axes:
+    periods = dataset["period"].values
+    ax.plot(periods, dataset["parameter"].values, marker="s", ms=4.0, mfc="white", **STABLE_LINE)
+    ax.set_ylabel(f"{parameter_name(dataset.attrs['path'])} of the doubling")
+    _name_periods(ax, periods)
+    return ax
+
+
+def _name_periods(ax: Axes, periods: np.ndarray) -> None:
+    ax.set_xscale("log", base=2)
+    ax.set_xlim(periods[0] / 1.4, periods[-1] * 1.4)
+    ax.xaxis.set_minor_locator(NullLocator())
+    ax.set_xticks(periods, [str(period) for period in periods])
+    ax.set_xlabel("forcing periods of the orbit that doubles")
+
+
+BACKBONE_LINE: dict[str, Any] = {"color": INK, "linestyle": (0, (6, 1.5, 1, 1.5)), "linewidth": 1.1}
+
+
+@drawing
+def draw_backbone(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
+    """Draw the dataset of `backbone`: amplitudes over the frequencies of the free orbits; returns the axes."""
+    ax = axes_or_new(ax, width, 0.75 * width)
+    ax.plot(dataset["frequency"].values, dataset["amplitude"].values, **BACKBONE_LINE)
+    ax.set_xlabel(r"frequency $2\pi/T$ of free motions")
+    ax.set_ylabel(f"${symbol(dataset.attrs['coordinate'])}$ at the turning point{unit_in_brackets(dataset['amplitude'])}")
     return ax

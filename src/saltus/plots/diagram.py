@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 
 from saltus.errors import ParameterError, shown
 from saltus.plots.axis_names import is_flat, parameter_name, peak, symbol, unit_in_brackets
-from saltus.plots.conventions import DOUBLE_COLUMN, INK, new_figure
-from saltus.plots.drawing import drawing
+from saltus.plots.conventions import DOUBLE_COLUMN, INK, drawing, new_figure
 from saltus.plots.response import draw_bands, draw_limits, draw_response, note_missed, response_legend
 
 POINTS: dict[str, Any] = {"color": INK, "linestyle": "none", "marker": ".", "markeredgewidth": 0.0, "rasterized": True}

@@ -1,18 +1,30 @@
-"""The phase plane of a study: its motions, equilibria and separatrices."""
+"""State planes: motions, equilibria and separatrices, with lines that stay apart; manifolds of saddle orbits."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from saltus.plots.axis_names import symbol, unit_in_brackets
-from saltus.plots.conventions import FAINT, SEPARATRIX_LINE, SINGLE_COLUMN, STABLE, UNSTABLE, axes_or_new, legend_of
-from saltus.plots.drawing import drawing
-from saltus.plots.marks import fixed_points
-from saltus.plots.phase_lines import draw_arrows, lines_apart
+from saltus.plots.axis_names import plane_of, state_label, symbol, unit_in_brackets
+from saltus.plots.conventions import (
+    FAINT,
+    INK,
+    SEPARATRIX_LINE,
+    SINGLE_COLUMN,
+    STABLE,
+    STABLE_LINE,
+    UNSTABLE,
+    UNSTABLE_LINE,
+    axes_or_new,
+    drawing,
+    legend_of,
+    marks_of,
+)
+from saltus.plots.marks import arrow_along, fixed_points
 
 ARROWS = 0.6  # window widths between arrows along a motion
 
@@ -59,3 +71,98 @@ def _legend(ax: Axes, own: bool, stable: np.ndarray, separatrices: bool) -> None
     if separatrices:
         handles.append(Line2D([], [], label="separatrix", **SEPARATRIX_LINE))
     legend_of(ax, own, handles, ncols=len(handles), columnspacing=1.4, handletextpad=0.5)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LineSpacing:
+    """How near lines and arrows of a phase plane may come to one another; lengths are in widths of the window."""
+
+    cells: int = 48  # cells along each side of the window: a motion is cut where it enters a cell with the line of another one
+    lap_cells: int = 160  # the cells for a motion and its own earlier laps
+    apart: float = 8 / 160  # least length between two laps: a motion that returns to a cell sooner has not left it
+    closing: float = 2 / 160  # length drawn beyond the first lap, so that the line of a periodic motion is closed
+    least: float = 0.08  # a motion is not drawn if less than this length is left of it
+    first_arrow: float = 0.12  # length from the start of a motion to its first arrow
+
+
+SPACING = LineSpacing()
+
+
+def travelled(points: np.ndarray) -> np.ndarray:
+    """The length of a line (n, 2) up to each of its points; jumps do not count."""
+    steps = np.hypot(*np.diff(points, axis=0).T)
+    return np.append(0.0, np.cumsum(np.nan_to_num(steps)))
+
+
+def draw_arrows(ax: Any, x: np.ndarray, v: np.ndarray, spacing: float, last: int = -1) -> None:
+    """Arrow heads about every `spacing` widths of the axes along a motion up to its sample `last`, none outside the axes."""
+    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    way = travelled(np.stack([x / (right - left), v / (high - low)], axis=1))
+    for at in sorted({int(np.searchsorted(way, place)) for place in np.arange(SPACING.first_arrow, way[last], spacing)}):
+        if left < x[at] < right and low < v[at] < high:
+            arrow_along(ax, x, v, at, STABLE)
+
+
+def lines_apart(motions: list[tuple[np.ndarray, np.ndarray]], window: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Motions (x, v), cut where they come near to an earlier one or to themselves, without those of which little is left."""
+    taken = np.zeros((SPACING.cells, SPACING.cells), dtype=bool)
+    lines = []
+    for x, v in motions:
+        scaled = (np.stack([x, v], axis=1) - window[:, 0]) / np.diff(window, axis=1)[:, 0]
+        inside, way = ((scaled >= 0.0) & (scaled < 1.0)).all(axis=1), travelled(scaled)
+        end = min(_first_near(scaled, inside, taken), _first_lap(scaled, inside, way))
+        if end > 0 and way[end - 1] >= SPACING.least:
+            here = (scaled[:end][inside[:end]] * SPACING.cells).astype(int)
+            taken[here[:, 0], here[:, 1]] = True
+            lines.append((x[:end], v[:end]))
+    return lines
+
+
+def _first_near(scaled: np.ndarray, inside: np.ndarray, taken: np.ndarray) -> int:
+    """The sample at which a motion enters a cell in which another one is drawn."""
+    cells = np.where(inside[:, None], scaled * SPACING.cells, 0.0).astype(int)
+    near = np.flatnonzero(taken[cells[:, 0], cells[:, 1]] & inside)
+    return int(near[0]) if near.size else len(scaled)
+
+
+def _first_lap(scaled: np.ndarray, inside: np.ndarray, way: np.ndarray) -> int:
+    """The sample at which a motion has come so near to an earlier lap of its own that the lines would run together."""
+    seen: dict[tuple[int, int], int] = {}
+    for k in np.flatnonzero(inside):
+        cell = (int(scaled[k, 0] * SPACING.lap_cells), int(scaled[k, 1] * SPACING.lap_cells))
+        if way[k] - way[seen.setdefault(cell, int(k))] > SPACING.apart:
+            return int(np.searchsorted(way, way[k] + SPACING.closing))
+    return len(scaled)
+
+
+SADDLE: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 4.5, "markerfacecolor": "white", "zorder": 5}
+
+
+@drawing
+def draw_manifold(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
+    """Draw the manifold of a saddle orbit at phase 0 of the load, the stable one solid, the unstable one dashed; returns `ax`."""
+    ax = axes_or_new(ax, width, 0.85 * width)
+    plane = plane_of(dataset)
+    stable = bool(dataset.attrs["stable"])
+    line, label = (STABLE_LINE, "stable manifold") if stable else (UNSTABLE_LINE, "unstable manifold")
+    ax.plot(*(dataset[name].values for name in plane), label=label, **{**line, "linewidth": 0.8})
+    ax.plot(*(dataset[f"orbit_{name}"].values for name in plane), markeredgecolor=INK, label="saddle orbit", **SADDLE)
+    ax.set_xlabel(state_label(dataset, plane[0], plane, " at phase 0"))
+    ax.set_ylabel(state_label(dataset, plane[1], plane, " at phase 0"))
+    marks = marks_of(ax)
+    ax.legend(marks.values(), marks.keys(), loc="best")
+    return ax
+
+
+@drawing
+def draw_separatrix(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
+    """Draw a separatrix in the phase plane and its saddle, an open mark; returns `ax`."""
+    ax = axes_or_new(ax, width, 0.85 * width)
+    plane = plane_of(dataset)
+    ax.plot(*(dataset[name].values for name in plane), label="separatrix", **SEPARATRIX_LINE)
+    ax.plot(float(dataset.attrs["saddle"]), 0.0, markeredgecolor=UNSTABLE, label="saddle", **SADDLE)
+    ax.set_xlabel(state_label(dataset, plane[0], plane))
+    ax.set_ylabel(state_label(dataset, plane[1], plane))
+    marks = marks_of(ax)
+    ax.legend(marks.values(), marks.keys(), loc="best")
+    return ax

@@ -14,8 +14,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 
-from saltus.branch_lines import ModelValidity, margins_of, smooth_lines, validity_of
 from saltus.branch_tables import branches_of
+from saltus.plots.branch_cuts import ModelValidity, margins_of, smooth_lines, validity_of
 from saltus.plots.conventions import (
     DOUBLE_COLUMN,
     INK,

@@ -9,8 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from saltus.branch_lines import border_curves
-from saltus.plots import DOUBLE_COLUMN, chart_legend, draw_chart, draw_closed_form, draw_lines, new_figure, panel_label, styled
+from saltus.plots import (
+    DOUBLE_COLUMN,
+    border_curves,
+    chart_legend,
+    draw_chart,
+    draw_closed_form,
+    draw_lines,
+    new_figure,
+    panel_label,
+    styled,
+)
 from saltus.studies import bordered_chart, wrong_cells
 from saltus.theory import high_frequency_onset
 from saltus_paper.claims.claim import Measures

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from saltus.flow import simulate
-from saltus.plots import DOUBLE_COLUMN, draw_history, draw_phase, new_figure, panel_label, styled
+from saltus.plots import DASHES, DOUBLE_COLUMN, FAINT, STABLE, UNSTABLE, arrow_along, new_figure, panel_label, styled
 from saltus.systems import Load, Metainterface, System, UnitCell
 from saltus_paper.claims.claim import Measured, measured
 from saltus_paper.figure_data import TOLERANCE, dataset, tree
@@ -80,6 +80,39 @@ def measure(data: Any) -> dict[str, Measured]:
             bool(abs(slope + 0.5) < 1e-3), slope=slope, to_go=to_go[-1], phi_velocity=rate[-1], theta_velocity=-velocity[-1]
         ),
     }
+
+
+PHI: dict[str, Any] = {"color": UNSTABLE, "ls": DASHES[1], "lw": 1.2}
+THETA: dict[str, Any] = {"color": STABLE, "ls": "-", "lw": 1.2}
+
+
+def draw_history(ax: Any, data: Any) -> None:
+    """abs(phi) and abs(theta) over tau - tau_*."""
+    time = -data["to_go"].values
+    ax.plot(time, abs(data["phi"].values), label=r"$|\varphi|$", **PHI)
+    ax.plot(time, abs(data["theta"].values), label=r"$|\theta|$", **THETA)
+    ax.axvline(0.0, color=FAINT, lw=0.8)
+    ax.set_xlim(time[0], 0.08)
+    ax.set_ylim(0, None)
+    ax.set_xlabel(r"$\tau-\tau_*$")
+    ax.set_ylabel(r"$|\varphi|,\ |\theta|$ (rad)")
+    ax.legend(loc="lower left")
+
+
+def draw_phase(ax: Any, data: Any, highest: float = 3.2) -> None:
+    """The rates against the angles, cut off at the rate `highest`, which phi' passes on its way to infinity."""
+    for name, style, label in (("phi", PHI, r"$|\varphi|$"), ("theta", THETA, r"$|\theta|$")):
+        angle, rate = abs(data[name].values), abs(data[f"{name}_velocity"].values)
+        ax.plot(angle, rate, label=label, **style)
+        arrow_along(ax, angle, rate, 250, style["color"], size=8)
+    ax.set_xlim(-0.02, None)
+    ax.set_ylim(0, highest)
+    ax.set_xlabel(r"$|\varphi|,\ |\theta|$ (rad)")
+    ax.set_ylabel(r"$|\dot\varphi|,\ |\dot\theta|$")
+    ax.annotate(
+        r"$|\dot\varphi|\to\infty$", xy=(0.115, 0.97), xycoords=("data", "axes fraction"), ha="left", va="top", color=UNSTABLE
+    )
+    ax.legend(loc="center right")
 
 
 FIGURE = paper_figure("fig03", compute=compute, draw=draw, measure=measure)

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from saltus.plots import DOUBLE_COLUMN, draw_portrait, new_figure, panel_label, styled
+from saltus.plots import DOUBLE_COLUMN, new_figure, panel_label, styled
 from saltus_paper.claims.claim import Measured, measured
 from saltus_paper.figure_data import TOLERANCE, tree
 from saltus_paper.figures.figure import paper_figure
-from saltus_paper.figures.phase_portraits import BETA0, VERTICAL, circled, closed, constant_load, outward, portrait
+from saltus_paper.figures.phase_portraits import BETA0, VERTICAL, circled, closed, constant_load, draw_portrait, outward, portrait
 
 BOUND = 2.55  # rad, a little outside the axes
 # Inside the separatrices, and far enough from them for both to be seen.

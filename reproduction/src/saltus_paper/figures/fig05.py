@@ -6,11 +6,20 @@ from typing import Any
 
 import numpy as np
 
-from saltus.plots import DOUBLE_COLUMN, draw_portrait, new_figure, panel_label, styled
+from saltus.plots import DOUBLE_COLUMN, new_figure, panel_label, styled
 from saltus_paper.claims.claim import Measured, measured
 from saltus_paper.figure_data import TOLERANCE, tree
 from saltus_paper.figures.figure import paper_figure
-from saltus_paper.figures.phase_portraits import BETA0, VERTICAL, circled, constant_load, loop_area, outward, portrait
+from saltus_paper.figures.phase_portraits import (
+    BETA0,
+    VERTICAL,
+    circled,
+    constant_load,
+    draw_portrait,
+    loop_area,
+    outward,
+    portrait,
+)
 
 STIFFNESS = {"a": 0.5, "b": 1.1}
 AXES = {"a": ((-2.6, 3.8), (-1.75, 1.75)), "b": ((-2.45, 2.45), (-0.95, 0.95))}

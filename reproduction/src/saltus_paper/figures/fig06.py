@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from saltus.flow import simulate
-from saltus.plots import DOUBLE_COLUMN, draw_histories, new_figure, panel_label, styled
+from saltus.plots import DASHES, DOUBLE_COLUMN, FAINT, new_figure, panel_label, shades, styled
 from saltus.systems import EnergyRestitution, Load, Metainterface, System, VelocityReduction
 from saltus.theory import total_energy, unloaded_peak_ratio, unloaded_period
 from saltus_paper.claims.claim import Measured, measured
@@ -174,6 +174,17 @@ def _extremes(data: Any) -> dict[str, Measured]:
 def _ratio(panel: Any) -> np.ndarray:
     ratio = panel["peak"].values / -THETA0
     return np.asarray(np.minimum(ratio, 1 / ratio))
+
+
+def draw_histories(ax: Any, data: Any, names: list[str], theta0: float) -> None:
+    """theta(case, phase) / abs(theta0) over tau / T0, which differ in shade and dashes."""
+    ax.axhline(0.0, color=FAINT, lw=1.2, zorder=0)
+    for i, (name, colour) in enumerate(zip(names, shades(len(names)), strict=True)):
+        ax.plot(data["phase"], data["theta"][i] / abs(theta0), color=colour, ls=DASHES[i], lw=1.1, label=name)
+    ax.set_xlim(0, float(data["phase"][-1]))
+    ax.set_ylim(-1.25, 3.9)
+    ax.set_xlabel(r"$\tau\,/\,T_0$")
+    ax.legend(loc="upper center", ncols=2, columnspacing=1.2)
 
 
 FIGURE = paper_figure("fig06", compute=compute, draw=draw, measure=measure)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from saltus.flow import simulate
-from saltus.plots import DOUBLE_COLUMN, draw_family, new_figure, panel_label, styled
+from saltus.plots import DASHES, DOUBLE_COLUMN, new_figure, panel_label, shades, styled
 from saltus.systems import Harmonic, Load, Metainterface, System, VelocityReduction
 from saltus.theory import peaks, potential_energy, reciprocal
 from saltus_paper.claims.claim import Measured, measured
@@ -213,6 +213,19 @@ def _far(limit: Any, disturbed: Any) -> dict[str, Measured]:
 def _deviation(panel: Any) -> float:
     theory = panel["ratio"].sel(stiffness_ratio=panel["dot"].values, method="nearest").values
     return float(np.abs(panel["simulated"].values / theory - 1).max())
+
+
+def draw_family(ax: Any, family: Any, names: list[str], title: str) -> None:
+    """Curves ratio(curve, stiffness_ratio) with dots simulated(curve, dot), which differ in shade and dashes."""
+    colours = shades(family.sizes["curve"])
+    for i, (name, colour) in enumerate(zip(names, colours, strict=True)):
+        ax.plot(family["stiffness_ratio"], family["ratio"][i], color=colour, ls=DASHES[i], lw=1.2, label=name)
+        ax.plot(family["dot"], family["simulated"][i], color=colour, ls="none", marker="o", ms=3.2, clip_on=False, zorder=4)
+    ax.set_xscale("log")
+    ax.set_xlim(1, float(family["stiffness_ratio"][-1]))
+    ax.set_ylim(0, 1.03)
+    ax.set_xlabel("stiffness ratio $k$")
+    ax.legend(title=title, loc="upper right")
 
 
 FIGURE = paper_figure("fig07", compute=compute, draw=draw, measure=measure)

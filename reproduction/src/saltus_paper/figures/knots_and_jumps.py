@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from saltus.branch_lines import smooth_lines
 from saltus.flow import simulate_many
 from saltus.orbits import PeriodicOrbit, orbits_of, solve
+from saltus.plots import smooth_lines
 from saltus.systems import System
 from saltus_paper.figure_data import dataset, largest_angle, scalar_dataset
 from saltus_paper.measures.spectrum_features import detached, first_fold, main_branch, turning

@@ -7,8 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from saltus.branch_lines import smooth_lines
-from saltus.plots import DOUBLE_COLUMN, FAINT, INK, STABLE, STABLE_LINE, UNSTABLE_LINE, new_figure, panel_label, styled
+from saltus.plots import (
+    DOUBLE_COLUMN,
+    FAINT,
+    INK,
+    STABLE,
+    STABLE_LINE,
+    UNSTABLE_LINE,
+    new_figure,
+    panel_label,
+    smooth_lines,
+    styled,
+)
 
 BOUNDS = (0.2, 1.0)  # Omega
 REGULAR = 0.6  # Omega of an orbit without a special point nearby

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.branch_lines import border_curves
+from saltus.plots import border_curves
 
 FIRST_MOTION = (1, 2)  # one forcing period, two impacts in it
 

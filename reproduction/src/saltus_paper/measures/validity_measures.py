@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.branch_lines import ModelValidity, smooth_lines
 from saltus.branch_tables import branches_of
+from saltus.plots import ModelValidity, smooth_lines
 from saltus_paper.claims.claim import Measured, measured
 
 AGREED = 0.01  # The least reactions by two equations agree within this, relative above 1: one of them is taken at instants.

@@ -1,17 +1,34 @@
-"""Lyapunov exponents: those of one motion with their checks, and those of many along one or two parameters."""
+"""Chaos: Lyapunov exponents, the verdict on a motion, and the bands of chaos along a parameter."""
 
 from __future__ import annotations
 
+import textwrap
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from saltus.errors import ParameterError
-from saltus.plots.axis_names import varied
-from saltus.plots.conventions import FAINT, INK, SINGLE_COLUMN, STABLE, STABLE_LINE, UNSTABLE_LINE, axes_or_new, legend_of
-from saltus.plots.drawing import drawing
+from saltus.plots.axis_names import parameter_name, plane_of, state_label, symbol, unit_in_brackets, varied
+from saltus.plots.conventions import (
+    DOUBLE_COLUMN,
+    FAINT,
+    INK,
+    SINGLE_COLUMN,
+    STABLE,
+    STABLE_LINE,
+    UNSTABLE_LINE,
+    axes_or_new,
+    drawing,
+    legend_of,
+    new_figure,
+    outside_legend,
+)
+from saltus.plots.diagram import draw_stroboscopic_states
 from saltus.plots.marks import cell_edges
+from saltus.plots.response import BAND_NAMES, BANDS, draw_bands
 
 NAME = r"exponent $\lambda$ (per unit of $\tau$)"
 ZERO: dict[str, Any] = {"color": INK, "linewidth": 0.5, "zorder": 1}
@@ -99,3 +116,78 @@ def _draw_map(ax: Axes, dataset: Any, dims: list[str]) -> Axes:
     ax.set_ylabel(second)
     ax.figure.colorbar(mesh, ax=ax, label=r"largest exponent $\lambda_1$ (per unit of $\tau$)")
     return ax
+
+
+LINE_LENGTH = 62  # characters of the sentence above a picture of one column
+
+
+@drawing
+def draw_verdict(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
+    """Draw the states at phase 0 on which a motion ends, its orbit if there is one, and the verdict's sentence; returns `ax`."""
+    own, ax = ax is None, axes_or_new(ax, width, 0.85 * width)
+    plane = plane_of(dataset)
+    states = [dataset[f"section_{name}"].values for name in plane]
+    many = len(states[0]) > 64
+    if f"curve_{plane[0]}" in dataset:
+        ax.plot(*(dataset[f"curve_{name}"].values for name in plane), label="its orbit", **STABLE_LINE)
+    ax.plot(
+        *states, ls="none", marker="o", color=INK, ms=1.2 if many else 4.5, mew=0.0, label="states at phase 0", rasterized=many
+    )
+    ax.set_xlabel(state_label(dataset, f"section_{plane[0]}", plane))
+    ax.set_ylabel(state_label(dataset, f"section_{plane[1]}", plane))
+    ax.legend(loc="best", markerscale=4.0 if many else 1.0)
+    if own:
+        sentence = f"{dataset['kind'].values}: {dataset['reason'].values}".replace("+-", "\u00b1")
+        ax.set_title("\n".join(textwrap.wrap(sentence, LINE_LENGTH)), loc="left", fontsize=8)
+    return ax
+
+
+VERDICTS = {"undecided": "x", "chaotic": "o", "transient": "^", "periodic": "s", "quasi_periodic": "D"}
+
+
+@drawing
+def draw_chaotic_bands(tree: Any, *, ax: Axes | None = None, figure: Figure | None = None) -> Any:
+    """Draw the tree of `chaotic_bands`: states at phase 0 above, exponents of unsettled motions below; returns both axes.
+
+    Into given axes only the states at phase 0 are drawn.
+    """
+    if ax is not None:
+        return _draw_states(ax, tree)
+    figure = new_figure(DOUBLE_COLUMN, 120.0) if figure is None else figure
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    _draw_states(above, tree).set_xlabel("")
+    handles: list[Any] = [Patch(color=BANDS["CH"], label=BAND_NAMES["CH"])] if tree["bands"].sizes["band"] else []
+    handles += _draw_deciding_exponents(below, tree)
+    if handles:
+        outside_legend(figure, handles=handles, ncols=4)
+    return np.array([above, below])
+
+
+def _draw_states(ax: Axes, tree: Any) -> Axes:
+    ax.set_xlim(*(float(x) for x in tree.attrs["bounds"]))
+    draw_stroboscopic_states(ax, tree)
+    states, name = tree["stroboscopic"], symbol(tree.attrs["coordinate"])
+    ax.set_ylabel(f"${name}$ at phase 0{unit_in_brackets(states['position'])}")
+    ax.set_xlabel(parameter_name(tree.attrs["path"]))
+    return ax
+
+
+def _draw_deciding_exponents(below: Axes, tree: Any) -> list[Any]:
+    """The exponents of unsettled motions, with a mark for each verdict; returns the handles of the marks for a legend."""
+    below.axhline(0.0, **ZERO)
+    draw_bands(below, tree)
+    handles = []
+    table = tree["exponents"]
+    verdict, marked = table["verdict"].values, table["verdict"].attrs
+    for number, meaning in zip(marked["flag_values"], marked["flag_meanings"].split(), strict=True):
+        here = (verdict == number) & np.isfinite(table["exponent"].values)
+        if here.any():
+            columns = (table[column].values[here] for column in ("value", "exponent", "error"))
+            marks: dict[str, Any] = {"color": INK, "fmt": VERDICTS[meaning], "ms": 3.0, "mfc": "white", "lw": 0.6, "mew": 0.6}
+            handles.append(below.errorbar(*columns, capsize=1.5, label=f"exponent, 95 %: {meaning.replace('_', '-')}", **marks))
+    if not np.isfinite(table["exponent"].values).any():
+        below.text(0.5, 0.5, "all motions settle", transform=below.transAxes, ha="center", va="bottom")
+        below.set_yticks([0.0])
+    below.set_ylabel(NAME)
+    below.set_xlabel(parameter_name(tree.attrs["path"]))
+    return handles
