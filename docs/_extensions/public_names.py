@@ -19,6 +19,7 @@ ROOMS = {
     "plots": "Pictures",
     "theory": "Closed forms",
     "config": "Studies in files",
+    "cli": "Commands of other packages",
     "errors": "Errors",
 }
 COMPLETE = ("theory",)  # rooms whose every name is for users
@@ -26,15 +27,18 @@ COMPLETE = ("theory",)  # rooms whose every name is for users
 RESULTS = {
     "attractors": (
         *("Attractor", "Attractors", "BasinEntropy", "Equilibrium", "Manifold", "Separatrix", "UncertaintyExponent", "Wada"),
-        *("ZeroOne", "equilibria"),
+        *("ZeroOne", "equilibria", "share_interval"),
     ),
+    "cli": ("progress_bar",),
     "config": ("Study",),
     "continuation": ("CurveEnd", "End", "Evidence", "Missed"),
-    "flow": ("ContactRegularity", "Event", "Impacts", "Release", "Validity"),
+    "flow": ("ContactRegularity", "Event", "Impacts", "Release", "Validity", "available_cores", "share_cores"),
     "orbits": ("Cascade", "OrbitEnd", "RestingOrbit", "Search", "Signature", "SpecialKind"),
     "studies": ("Borders",),
     "sweep": ("Failure", "Plan", "StoreStatus", "SweepInterrupted", "Variable"),
-    "systems": ("Channel", "MarginKind", "Scenario", "reversed_system", "table_1"),
+    "systems": (
+        *("Channel", "LayerState", "MarginKind", "Scenario", "name_impact", "other_impulse", "reversed_system", "table_1"),
+    ),
 }
 
 

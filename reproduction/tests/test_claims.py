@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from picture_checks import check_provenance, clipped
 
-from saltus.errors import SaltusError
+from saltus import SaltusError
 from saltus_paper import FIGURES, ClaimVerdict
 from saltus_paper.claims.claim import judge, judge_claim, measured, printed_unit, with_summaries
 from saltus_paper.claims.claim_tables import ClaimEntry, ListForm, Origin, claim_tables, section_titles

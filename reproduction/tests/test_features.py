@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from spectrum_cases import branch, diagram, folded, loop
 
-from saltus.branch_tables import branch_of
+from saltus import branch_of
 from saltus_paper.measures import spectrum_features as features
 
 

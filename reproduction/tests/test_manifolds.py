@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from reference_manifolds import manifold
 
+from saltus import ParameterError
 from saltus.attractors import separatrices
-from saltus.errors import ParameterError
 from saltus.flow import simulate
 from saltus.systems import EnergyRestitution
 from saltus.theory import equilibria, total_energy

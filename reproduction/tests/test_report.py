@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from saltus.errors import ParameterError
+from saltus import ParameterError
 from saltus.files import read_dataset, write_dataset
 from saltus_paper import FIGURES, ClaimVerdict, report_from_results, reproduce
 from saltus_paper import up_to_date as state

@@ -7,7 +7,7 @@ import re
 import pytest
 import xarray as xr
 
-from saltus.errors import ParameterError
+from saltus import ParameterError
 from saltus.files import write_dataset
 from saltus.systems import System
 from saltus_paper import FIGURES, reproduce

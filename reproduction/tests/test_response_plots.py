@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 from spectrum_cases import branch, diagram, folded, loop
 
+from saltus.plots import ModelValidity, branch_lines, response, smooth_lines
 from saltus.plots import conventions as style
-from saltus.plots import response
-from saltus.plots.branch_cuts import ModelValidity, branch_lines, smooth_lines
 
 
 def lines(ax, line):

@@ -7,7 +7,7 @@ from operator import itemgetter
 import numpy as np
 import pytest
 
-from saltus.errors import ParameterError
+from saltus import ParameterError
 from saltus.plots.conventions import new_figure
 from saltus_paper import PaperFigure, reproduce
 from saltus_paper import up_to_date as state
@@ -106,7 +106,7 @@ def test_other_parameters_make_it_again(tmp_path, registry):
         ("saltus.theory.loaded_equilibria", True),
         ("saltus.flow.kernel.roots", True),
         ("saltus.systems.metainterface", True),
-        ("saltus.plots.loading_paths", True),
+        ("saltus.plots.marks", True),
         ("saltus_paper.figures.fig09", False),
         ("saltus.plots.basins", False),  # other inner files of a room that it uses
         ("saltus.theory.rocking", False),

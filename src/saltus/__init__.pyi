@@ -14,8 +14,8 @@ from .attractors import (
     zero_one_test,
 )
 from .bounds import capture_speed
-from .branch_tables import branch_of
-from .config import load, load_study, to_mat
+from .branch_tables import branch_of, branches_of
+from .config import load, load_study, save, to_mat
 from .errors import MotionError, ParameterError, SaltusError, SweepError, TraceError
 from .flow import Ending, EventKind, Motion, Sensitivities, Stop, sensitivities, simulate, simulate_many, stop_names
 from .orbits import (
@@ -131,6 +131,7 @@ __all__ = [
     "basins_of_attraction",
     "bifurcation_diagram",
     "branch_of",
+    "branches_of",
     "capture_speed",
     "chaotic_bands",
     "classify",
@@ -154,6 +155,7 @@ __all__ = [
     "plot",
     "register",
     "response_spectrum",
+    "save",
     "search_orbits",
     "sensitivities",
     "separatrices",

@@ -61,10 +61,34 @@ def _numbers(counts: np.ndarray) -> np.ndarray:
     return np.repeat(np.arange(len(counts)), counts)
 
 
-def branches_of(diagram: Any) -> Iterator[tuple[int, xarray.Dataset]]:
-    """(number, Dataset) of every branch of a diagram's DataTree, in order."""
+def branches_of(diagram: xarray.DataTree) -> Iterator[tuple[int, xarray.Dataset]]:
+    """Every branch of a diagram in order, as its number and what `branch_of` gives for it.
+
+    Parameters
+    ----------
+    diagram
+        A diagram as `bifurcation_diagram` or `response_spectrum` returns it.
+
+    Raises
+    ------
+    ParameterError
+        A tree without branches.
+
+    Examples
+    --------
+    >>> diagram = saltus.bifurcation_diagram(system, bounds=(0.45, 0.55), max_period=1, values=[0.5], starts=4, bands=False)
+    >>> [(number, branch.sizes["point"] > 1) for number, branch in saltus.branches_of(diagram)]
+    [(0, True)]
+    """
+    _check_tables(diagram)
     tables = _Tables(diagram)
     return ((number, tables.branch(number)) for number in range(tables.count))
+
+
+def _check_tables(diagram: Any) -> None:
+    missing = [name for name in ("branches", *TABLES.values(), "orbits") if name not in getattr(diagram, "children", ())]
+    if missing:
+        raise ParameterError(f"diagram must be the tree of a diagram, or of one panel; this one has no {missing[0]!r}", "diagram")
 
 
 def branch_of(diagram: xarray.DataTree, number: int) -> xarray.Dataset:
@@ -89,9 +113,7 @@ def branch_of(diagram: xarray.DataTree, number: int) -> xarray.Dataset:
     array([0.45, 0.55])
     """
 
-    missing = [name for name in ("branches", *TABLES.values(), "orbits") if name not in diagram.children]
-    if missing:
-        raise ParameterError(f"diagram must be the tree of a diagram, or of one panel; this one has no {missing[0]!r}", "diagram")
+    _check_tables(diagram)
     tables = _Tables(diagram)
     check_count("number", number, 0, tables.count - 1)
     return tables.branch(number)

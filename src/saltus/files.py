@@ -94,18 +94,29 @@ def write_figure(stem: Path | str, figure: Any, title: str | None = None) -> lis
 
     The PDF has the layout of the PNG, as computing a second layout would take a third of the time of both.
     """
-    png = _write_picture(Path(f"{stem}.png"), figure, "png", {})
+    png = write_picture(Path(f"{stem}.png"), figure)
     layout = figure.get_layout_engine()
     figure.set_layout_engine("none")
     try:
-        return [png, _write_picture(Path(f"{stem}.pdf"), figure, "pdf", {"CreationDate": None, "Title": title})]
+        return [png, write_picture(Path(f"{stem}.pdf"), figure, title)]
     finally:
         figure.set_layout_engine(layout)
 
 
-def _write_picture(path: Path, figure: Any, kind: str, metadata: dict[str, Any]) -> Path:
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format=kind, metadata=metadata)
+def write_picture(path: Path, figure: Any, title: str | None = None) -> Path:
+    """Write a matplotlib Figure in the format that the suffix of `path` names; `title` is that of a PDF.
+
+    Raises
+    ------
+    ParameterError
+        Matplotlib has no such format.
+    """
+    kind, buffer = path.suffix.removeprefix("."), io.BytesIO()
+    known = figure.canvas.get_supported_filetypes()
+    if kind not in known:
+        raise ParameterError(f"{path} must end in .png, .pdf or .svg, for a picture of that format", "path")
+    metadata = {"pdf": {"CreationDate": None, "Title": title}, "svg": {"Date": None, "Title": title}}
+    figure.savefig(buffer, format=kind, metadata=metadata.get(kind, {}))
     return write_bytes(path, buffer.getvalue())
 
 

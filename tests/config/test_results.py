@@ -116,3 +116,44 @@ def test_progress_is_one_line_that_ends(capsys):
 def test_stops_have_names():
     many = saltus.simulate_many(SYSTEM, theta=[0.0, 0.3], periods=2)
     assert set(saltus.stop_names(many)) <= {str(stop) for stop in saltus.Stop}
+
+
+def test_what_is_saved_is_loaded_again_and_an_own_dataset_gets_the_version(tmp_path, motion):
+    path = saltus.save(tmp_path / "there" / "motion", motion)
+    assert path.name == "motion.nc"
+    assert saltus.load(path).identical(motion.to_xarray())
+    own = xarray.Dataset({"y": ("x", [1.0, 2.0])})
+    for data in (own, xarray.DataTree.from_dict({"/": own, "/below": own})):
+        back = saltus.load(saltus.save(tmp_path / "own.nc", data))
+        assert back.attrs == {"saltus_version": saltus.__version__}
+        assert not data.attrs
+
+
+@pytest.mark.parametrize(("name", "begins"), [("p", b"\x89PNG"), ("p.png", b"\x89PNG"), ("p.pdf", b"%PDF"), ("p.svg", b"<?xml")])
+def test_a_picture_is_saved_in_the_format_of_its_suffix(tmp_path, motion, name, begins):
+    first = saltus.save(tmp_path / name, saltus.plot(motion), title="a motion").read_bytes()
+    assert first.startswith(begins)
+    if name.endswith((".png", ".pdf")):
+        assert saltus.save(tmp_path / name, saltus.plot(motion), title="a motion").read_bytes() == first
+
+
+def test_texts_are_saved_as_they_are(tmp_path):
+    assert saltus.save(tmp_path / "a.txt", "größe\n").read_text(encoding="utf-8") == "größe\n"
+    assert saltus.save(tmp_path / "a.txt", b"\x00").read_bytes() == b"\x00"
+
+
+@pytest.mark.parametrize(
+    ("path", "result", "said"),
+    [
+        ("a.nc", 5, "result must be"),
+        ("", "text", "path must name a file"),
+        ("file/a.txt", "text", "cannot be written"),
+        ("a.xyz", "figure", "must end in .png, .pdf or .svg"),
+        (5, "text", "path must"),
+    ],
+)
+def test_what_cannot_be_saved_is_refused(tmp_path, monkeypatch, motion, path, result, said):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").touch()
+    with pytest.raises(ParameterError, match=said):
+        saltus.save(path, saltus.plot(motion) if result == "figure" else result)

@@ -55,7 +55,7 @@ def report(
 
 def reproduce_paper(names: Sequence[str], output: Path, force: bool) -> None:
     """Reproduce the named parts of the paper, or all, into `output`; print what was made, and the verdicts on the claims."""
-    from saltus.cli.progress_bar import progress_bar
+    from saltus.cli import progress_bar
     from saltus_paper import FIGURES, HEADINGS, ledger, tally, with_summaries
     from saltus_paper import reproduce as made
 

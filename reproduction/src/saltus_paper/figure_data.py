@@ -8,10 +8,15 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.provenance import provenance
-from saltus.systems import System
+import saltus
+from saltus import System
 
 TOLERANCE = 1e-12  # the tolerance of every motion that is shown in a figure
+
+
+def provenance(system: System | None = None, **more: Any) -> dict[str, Any]:
+    """The attributes of every dataset: the version of saltus, the system as JSON if there is one, and further ones."""
+    return {"saltus_version": saltus.__version__, **({"system": system.to_json()} if system else {}), **more}
 
 
 def dataset(

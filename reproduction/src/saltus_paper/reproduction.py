@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import difflib
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from saltus.errors import ParameterError, near
-from saltus.files import check_writable, write_dataset, write_figure, write_text
+from saltus import ParameterError, save
 from saltus.plots import style
-from saltus.progress import Progress, silent
 from saltus_paper import up_to_date as state
 from saltus_paper.claims.claim import Claim
 from saltus_paper.figures.figure import PaperFigure
+from saltus_paper.output_folder import check_writable
 from saltus_paper.panel_work import compute_panels
 from saltus_paper.report.report import write_report
+
+Progress = Callable[[float, str], object]  # what `saltus.cli.progress_bar` and `saltus.show_progress` are
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,7 +33,10 @@ class MadeFigure:
 
 
 def reproduce(
-    names: Sequence[str] = (), output: Path | str = Path("results"), force: bool = False, progress: Progress = silent
+    names: Sequence[str] = (),
+    output: Path | str = Path("results"),
+    force: bool = False,
+    progress: Progress = lambda fraction, what: None,
 ) -> list[MadeFigure]:
     """Compute and draw the named parts of the paper (all if none is named) into `output`, and write the report.
 
@@ -46,7 +51,9 @@ def reproduce(
 
     for name in names:
         if name not in FIGURES:
-            raise ParameterError(f"no part of the paper is called {name!r}; {near(name, FIGURES)}")
+            alike = difflib.get_close_matches(name, FIGURES)
+            hint = f"did you mean {' or '.join(map(repr, alike))}?" if alike else f"its parts are {', '.join(FIGURES)}"
+            raise ParameterError(f"no part of the paper is called {name!r}; {hint}")
     output = Path(output)
     check_writable(output)
     chosen = [figure for name, figure in FIGURES.items() if not names or name in names]
@@ -81,10 +88,12 @@ def _result(figure: PaperFigure, output: Path, seconds: Mapping[str, float]) -> 
 
 
 def _write(figure: PaperFigure, data: Any, output: Path) -> None:
-    write_dataset(output / f"{figure.name}.nc", data)
+    save(output / f"{figure.name}.nc", data)
     if figure.table is not None:
-        write_text(output / f"{figure.name}.md", figure.table(data))
+        save(output / f"{figure.name}.md", figure.table(data))
     if figure.draw is not None:
         picture = figure.draw(data)
         with style():
-            write_figure(output / figure.name, picture, figure.title)
+            save(output / f"{figure.name}.png", picture)
+            picture.set_layout_engine("none")  # the PDF has the layout of the PNG: a second one would take as long again
+            save(output / f"{figure.name}.pdf", picture, title=figure.title)

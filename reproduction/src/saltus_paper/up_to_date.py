@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import saltus
-from saltus.files import parsed_json, write_text
 from saltus_paper.claims.claim import Claim
 from saltus_paper.claims.claim_tables import claim_tables
 from saltus_paper.figures.figure import PaperFigure
@@ -55,9 +54,16 @@ def _imports(module: str) -> list[str]:
         if isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
-            homes = _behind_the_door(node.module)
-            names += [node.module, *(homes.get(alias.name, f"{node.module}.{alias.name}") for alias in node.names)]
+            names += [node.module, *(_home(node.module, alias.name) for alias in node.names)]
     return [name for name in names if name.startswith(("saltus.", "saltus_paper."))]
+
+
+def _home(package: str, name: str) -> str:
+    """The module that defines a name which a package gives, behind as many front doors as there are."""
+    module = _behind_the_door(package).get(name)
+    if module is None:
+        return f"{package}.{name}"
+    return _home(module, name) if name in _behind_the_door(module) else module
 
 
 @cache
@@ -67,7 +73,7 @@ def _behind_the_door(package: str) -> dict[str, str]:
     stub = None if path is None else path.with_suffix(".pyi")
     if stub is None or path is None or path.name != "__init__.py" or not stub.exists():
         return {}
-    imports = [node for node in ast.parse(stub.read_text()).body if isinstance(node, ast.ImportFrom)]
+    imports = [node for node in ast.parse(stub.read_text()).body if isinstance(node, ast.ImportFrom) and node.module]
     return {alias.name: f"{package}.{node.module}" for node in imports for alias in node.names}
 
 
@@ -112,7 +118,7 @@ def intact(figure: PaperFigure, folder: Path) -> bool:
 def read(figure: PaperFigure, folder: Path) -> dict[str, Any] | None:
     """The record that `write` left, or None where there is none that can be read."""
     try:
-        record = parsed_json((folder / FOLDER / f"{figure.name}.json").read_text(encoding="utf-8"))
+        record = json.loads((folder / FOLDER / f"{figure.name}.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
     return record if isinstance(record, dict) else None
@@ -133,7 +139,7 @@ def write(figure: PaperFigure, folder: Path, made: Iterable[Claim], seconds: flo
     versions = {name: version(name) for name in ("saltus", *PACKAGES)}
     record = {"key": key(figure), "files": files, "seconds": round(seconds, 1), "versions": versions}
     record["claims"] = [claim.to_dict() for claim in made]
-    write_text(folder / FOLDER / f"{figure.name}.json", json.dumps(record, indent=1))
+    saltus.save(folder / FOLDER / f"{figure.name}.json", json.dumps(record, indent=1))
 
 
 def fingerprint(path: Path) -> str | None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.attractors.stroboscopic_section import is_constant
+from saltus.checks import check_count
 from saltus.flow import Ending, extrema_names, state_names
 from saltus.orbits import PeriodicOrbit
 from saltus.provenance import provenance
@@ -27,7 +28,28 @@ DEVIATIONS = 1.96  # standard deviations to each side of a 95 % interval
 
 
 def share_interval(number: int, sample: int) -> tuple[float, float]:
-    """The 95 % interval (Wilson's) of a share, of which `number` out of `sample` were found; nan without a sample."""
+    """The 95 % interval (Wilson's) of a share that is estimated from a sample; nan without a sample.
+
+    Parameters
+    ----------
+    number
+        How many of the sample were found.
+    sample
+        The size of the sample.
+
+    Raises
+    ------
+    ParameterError
+        More found than there are in the sample.
+
+    Examples
+    --------
+    >>> low, high = saltus.attractors.share_interval(4, 400)
+    >>> round(low, 4), round(high, 4)
+    (0.0039, 0.0254)
+    """
+    check_count("sample", sample, 0)
+    check_count("number", number, 0, sample)
     if not sample:
         return (math.nan, math.nan)
     share, spread = number / sample, DEVIATIONS**2 / sample

@@ -1,4 +1,5 @@
-"""The command line: `saltus simulate`, `run`, `plot`, `status`, `info`, `doctor` and `reproduce`, each in the file of its name.
+"""The command line: `saltus simulate`, `run`, `plot`, `status`, `info` and `doctor`, each in the file of its name, and
+those that other packages add.
 
 Only typer and rich are imported before a command runs, so that help is immediate.
 """
@@ -7,9 +8,10 @@ import os
 import signal
 from typing import Any
 
+from saltus._front_door import front_door
 from saltus.cli.interrupt import INTERRUPTED, INTERRUPTION
 
-__all__ = ["main"]
+__getattr__, __dir__, __all__ = front_door(__name__, __file__)
 
 
 def main() -> None:

@@ -81,7 +81,7 @@ def check_scheduler(study: Study, scheduler: str) -> None:
 def answer(study: Study, ask: Ask, output: Path, plot: bool, scheduler: str | None) -> None:
     """Compute, write and draw the answer to one question, and print its summary."""
     from saltus.cli.answer_summary import summarise
-    from saltus.cli.progress_bar import progress_bar
+    from saltus.cli.drawn_progress import progress_bar
 
     console = Console(highlight=False)
     with progress_bar(ask.kind.replace("_", " ")) as progress:

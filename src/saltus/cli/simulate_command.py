@@ -33,8 +33,8 @@ def simulate_study(path: Path, output: Path | None, plot: bool) -> None:
     SaltusError
         A bad study, a folder that cannot be written to (before anything is computed), a motion that cannot go on.
     """
+    from saltus.cli.drawn_progress import progress_bar
     from saltus.cli.motion_summary import print_summary
-    from saltus.cli.progress_bar import progress_bar
     from saltus.config import load_study
     from saltus.files import check_writable
 

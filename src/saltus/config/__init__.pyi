@@ -1,6 +1,6 @@
 from .questions import Ask
-from .results import kind_of, load, open_result, to_mat
+from .results import kind_of, load, open_result, save, to_mat
 from .settings import Settings
 from .study import Study, load_study
 
-__all__ = ["Ask", "Settings", "Study", "kind_of", "load", "load_study", "open_result", "to_mat"]
+__all__ = ["Ask", "Settings", "Study", "kind_of", "load", "load_study", "open_result", "save", "to_mat"]

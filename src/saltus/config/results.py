@@ -103,6 +103,74 @@ def kind_of(data: Any) -> str:
 
 
 @answered
+def save(path: str | Path, result: Any, *, title: str | None = None) -> Path:
+    """Write a result, a picture or a text to a file that is complete or not there, also after a kill; returns its path.
+
+    Results become netCDF with a checksum behind it, which `load` compares; a dataset of one's own gets the version of saltus
+    among its attributes. A picture has the format that its suffix names, and the same bytes whenever it is drawn again. Folders
+    are made as needed.
+
+    Parameters
+    ----------
+    path
+        The file; ".nc" is appended to that of a result, and ".png" to that of a picture, if it has no suffix.
+    result
+        A Dataset, a DataTree, a result with `to_xarray`, such as a motion or a branch; a Matplotlib figure, or axes, such as
+        `plot` returns; a text, or bytes.
+    title
+        The title of a picture in the description of a PDF.
+
+    Raises
+    ------
+    ParameterError
+        What cannot be written, or a place at which no file can be made.
+
+    Examples
+    --------
+    >>> path = saltus.save("branch.nc", branch)
+    >>> len(saltus.orbits.orbits_of(saltus.load(path))) == len(branch.orbits)
+    True
+    """
+    from saltus import files
+
+    if not isinstance(path, (str, os.PathLike)) or not Path(path).name:
+        raise ParameterError(f"path must name a file, such as branch.nc, got {shown(path)}", "path")
+    path = Path(path)
+    data = result.to_xarray() if hasattr(result, "to_xarray") else result
+    try:
+        if isinstance(data, (str, bytes)):
+            return files.write_bytes(path, data.encode() if isinstance(data, str) else data)
+        if hasattr(data, "data_vars") and hasattr(data, "attrs"):
+            return files.write_dataset(path if path.suffix else path.with_suffix(".nc"), _with_version(data))
+        figure = _figure_of(data)
+        if figure is None:
+            raise ParameterError(
+                f"result must be a Dataset, a DataTree, a figure, a text or what has to_xarray, got {shown(result)}", "result"
+            )
+        return files.write_picture(path if path.suffix else path.with_suffix(".png"), figure, title)
+    except OSError as error:
+        raise ParameterError(f"{path} cannot be written ({(error.strerror or str(error)).lower()})", "path") from error
+
+
+def _with_version(data: Any) -> Any:
+    """The same data; with the version of saltus if their attributes have none."""
+    from saltus import __version__
+
+    if "saltus_version" in data.attrs:
+        return data
+    data = data.copy()
+    data.attrs = {"saltus_version": __version__, **data.attrs}
+    return data
+
+
+def _figure_of(data: Any) -> Any:
+    """A figure, or that of axes or of an array of axes; None of anything else."""
+    first = data.flat[0] if isinstance(data, np.ndarray) and data.size else data
+    figure = getattr(first, "figure", first)
+    return figure if hasattr(figure, "savefig") else None
+
+
+@answered
 def to_mat(path: str | Path, result: xarray.Dataset | xarray.DataTree | Result) -> Path:
     """Write a result as a MATLAB file (version 5), which `load` of MATLAB and Octave reads; returns its path.
 

@@ -30,7 +30,20 @@ class Scenario(Enum):
 
 
 class LayerState(NamedTuple):
-    """Angles (theta_1, theta_2), rad, and velocities of both layers at one instant."""
+    """The state of both layers at one instant.
+
+    Attributes
+    ----------
+    theta
+        The angles (theta_1, theta_2), rad.
+    velocity
+        Their rates.
+
+    Examples
+    --------
+    >>> saltus.systems.LayerState(theta=(0.0, -0.3), velocity=(-1.0, 0.5)).velocity
+    (-1.0, 0.5)
+    """
 
     theta: Two
     velocity: Two
@@ -83,11 +96,26 @@ def name_impact(before: LayerState, after: LayerState, *, model: TwoLayer | None
     `model`, an impact on one layer while the other is open must keep the balance of `other_impulse`. An impact that
     stops everything, as in errata 25 outside 45 to 135 degrees, is no bouncing with no deformed layer after it.
 
+    Parameters
+    ----------
+    before, after
+        The states of both layers just before the impact and just after it.
+    model
+        The model whose balance is compared.
+    tolerance
+        What counts as zero.
+
     Raises
     ------
     ParameterError
         Angles that jump (`controtrot`), no layer or both layers impacting, a layer that
         closes further, or a balance that is not kept.
+
+    Examples
+    --------
+    >>> before = saltus.systems.LayerState((0.0, 0.0), (-1.0, 0.0))
+    >>> saltus.systems.name_impact(before, saltus.systems.LayerState((0.0, 0.0), (0.5, 0.0))).scenario.value
+    'bouncing'
     """
     _check_states(before, after, tolerance)
     speed = tolerance * max(1e-300, *map(abs, before.velocity), *map(abs, after.velocity))
@@ -116,6 +144,22 @@ def other_impulse(model: TwoLayer, before: LayerState, after: LayerState, layer:
 
     It is zero while layer j is open, so its velocity jumps whenever that of layer s does (M_12 is not zero, erratum 16); on
     a closed layer its contact may act too, with an impulse that opens it: >= 0 for j = 1, <= 0 for j = 2.
+
+    Parameters
+    ----------
+    model
+        The two layers.
+    before, after
+        The states of both layers just before the impact and just after it.
+    layer
+        The layer that is hit, 1 or 2.
+
+    Examples
+    --------
+    >>> before = saltus.systems.LayerState((0.0, 0.0), (-1.0, 0.0))
+    >>> after = saltus.systems.LayerState((0.0, 0.0), (0.5, 0.0))
+    >>> round(saltus.systems.other_impulse(saltus.TwoLayer(beta0=np.pi / 2), before, after, 1), 12)
+    0.0
     """
     s, j = layer - 1, 2 - layer
     jump = np.subtract(after.velocity, before.velocity)

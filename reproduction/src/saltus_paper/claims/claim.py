@@ -13,7 +13,7 @@ from decimal import Decimal
 from enum import StrEnum
 from typing import Any
 
-from saltus.errors import SaltusError, near
+from saltus import SaltusError
 from saltus_paper.claims.claim_tables import BESIDE_TABLE, ClaimEntry, Origin, claim_tables
 
 
@@ -108,7 +108,7 @@ def judge(part: str, measures: Measures) -> list[Claim]:
     if missing:
         raise SaltusError(f"{part} did not measure its claims {', '.join(sorted(missing))}")
     if unknown:
-        raise SaltusError("; ".join(f"{part} has no claim {id!r}; {near(id, to_measure)}" for id in sorted(unknown)))
+        raise SaltusError(f"{part} measures what no claim of its table asks for: {', '.join(sorted(unknown))}")
     claims = []
     for id, entry in entries.items():
         one = measures.get(id)

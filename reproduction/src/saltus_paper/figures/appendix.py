@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow import simulate
+from saltus import Harmonic, Load, RockingBlock, simulate
 from saltus.plots import DOUBLE_COLUMN, FAINT, INK, STABLE, new_figure, panel_label, shades, styled
-from saltus.systems import Harmonic, Load, RockingBlock
 from saltus.theory import (
     rocking_energy_decreases,
     rocking_energy_jump,

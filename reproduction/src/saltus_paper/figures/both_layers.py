@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.flow import Ending, Recurrence, find_recurrence, simulate
-from saltus.systems import NewtonImpact, System, TwoLayer
+from saltus import NewtonImpact, System, TwoLayer, simulate
+from saltus.flow import Ending, Recurrence, find_recurrence
 from saltus_paper.claims.claim import Measured, measured
 from saltus_paper.figure_data import dataset, joined
 from saltus_paper.figures import fig04, fig05

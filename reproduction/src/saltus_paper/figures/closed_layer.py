@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.branch_tables import branches_of
-from saltus.orbits import PeriodicOrbit, orbits_of
-from saltus.systems import TwoLayer
+from saltus import PeriodicOrbit, TwoLayer, branches_of
+from saltus.orbits import orbits_of
 from saltus_paper.figure_data import dataset
 from saltus_paper.measures.spectrum_features import within
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from saltus import UnitCell
 from saltus.plots import (
     DOUBLE_COLUMN,
     draw_cell,
@@ -17,7 +18,6 @@ from saltus.plots import (
     panel_label,
     styled,
 )
-from saltus.systems import UnitCell
 from saltus_paper.figure_data import dataset, tree
 from saltus_paper.figures.figure import paper_figure
 

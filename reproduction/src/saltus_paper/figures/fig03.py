@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow import simulate
+from saltus import Load, Metainterface, System, UnitCell, simulate
 from saltus.plots import DASHES, DOUBLE_COLUMN, FAINT, STABLE, UNSTABLE, arrow_along, new_figure, panel_label, styled
-from saltus.systems import Load, Metainterface, System, UnitCell
 from saltus_paper.claims.claim import Measured, measured
 from saltus_paper.figure_data import TOLERANCE, dataset, tree
 from saltus_paper.figures.figure import paper_figure

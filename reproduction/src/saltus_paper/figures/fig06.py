@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow import simulate
+from saltus import EnergyRestitution, Load, Metainterface, System, VelocityReduction, simulate
 from saltus.plots import DASHES, DOUBLE_COLUMN, FAINT, new_figure, panel_label, shades, styled
-from saltus.systems import EnergyRestitution, Load, Metainterface, System, VelocityReduction
 from saltus.theory import total_energy, unloaded_peak_ratio, unloaded_period
 from saltus_paper.claims.claim import Measured, measured
 from saltus_paper.figure_data import TOLERANCE, dataset, tree

@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow import simulate
+from saltus import Harmonic, Load, Metainterface, System, VelocityReduction, simulate
 from saltus.plots import DASHES, DOUBLE_COLUMN, new_figure, panel_label, shades, styled
-from saltus.systems import Harmonic, Load, Metainterface, System, VelocityReduction
 from saltus.theory import peaks, potential_energy, reciprocal
 from saltus_paper.claims.claim import Measured, measured
 from saltus_paper.figure_data import TOLERANCE, dataset, scalar_dataset, scalars, tree

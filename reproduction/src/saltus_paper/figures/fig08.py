@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow import Stop, simulate
+from saltus import Harmonic, Load, Metainterface, Stop, System, simulate
 from saltus.plots import DOUBLE_COLUMN, INK, STABLE_LINE, UNSTABLE_LINE, arrow_along, new_figure, panel_label, styled
-from saltus.systems import Harmonic, Load, Metainterface, System
 from saltus.theory import (
     critical_horizontal,
     equilibria,

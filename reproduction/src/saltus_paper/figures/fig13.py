@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow import simulate
+from saltus import simulate
 from saltus.plots import (
     DOUBLE_COLUMN,
     FAINT,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from saltus.systems import Harmonic, Load, Metainterface, System
+from saltus import Harmonic, Load, Metainterface, System
 
 BETA0, DAMPING, VERTICAL = 80.0, 0.1, -0.5  # degrees, C, Vbar
 SWING = 0.25  # Vhat of load (iii)

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow import simulate_many
-from saltus.orbits import PeriodicOrbit, orbits_of, solve
+from saltus import MotionError, System, find_orbit, simulate_many
+from saltus.orbits import orbits_of
 from saltus.plots import smooth_lines
-from saltus.systems import System
 from saltus_paper.figure_data import dataset, largest_angle, scalar_dataset
 from saltus_paper.measures.spectrum_features import detached, first_fold, main_branch, turning
 
@@ -33,8 +32,14 @@ SETTINGS = KnotSettings()
 def orbit_at(branch: Any, index: int, value: float) -> Any:
     """The orbit of a branch near its point `index`, solved at a value of the parameter; None where Newton does not converge."""
     (near,) = orbits_of(branch.isel(point=[index]))
-    found = solve(near.equations, near.solution.unknowns, np.array([value]))
-    return None if found is None else PeriodicOrbit(near.equations, found)
+    if value == float(branch["parameter"][index]):
+        return near
+    theta, velocity = near.state
+    system = near.system.with_({str(branch.attrs["path"]): value})
+    try:
+        return find_orbit(system, theta=float(theta), velocity=float(velocity), period=near.period, settle=0)
+    except MotionError:
+        return None
 
 
 def knots(spectrum: Any) -> Any:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow import simulate_many
+from saltus import simulate_many
 from saltus.plots import (
     DOUBLE_COLUMN,
     draw_beside,

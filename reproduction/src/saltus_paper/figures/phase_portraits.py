@@ -10,10 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow import simulate
+from saltus import Load, Metainterface, System, VelocityReduction, phase_portrait, simulate
 from saltus.plots import FAINT, SEPARATRIX_LINE, STABLE, draw_arrows, fixed_points, limit_lines
-from saltus.studies import phase_portrait
-from saltus.systems import Load, Metainterface, System, VelocityReduction
 from saltus.theory import potential_energy, total_energy
 from saltus_paper.figure_data import TOLERANCE, dataset
 

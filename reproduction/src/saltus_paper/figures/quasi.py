@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from saltus.attractors import excludes_tori
+from saltus import chaotic_bands, excludes_tori
 from saltus.flow import Ending
 from saltus.plots import DOUBLE_COLUMN, FAINT, POINTS, STABLE, UNSTABLE, draw_bands, new_figure, panel_label, styled
-from saltus.studies import chaotic_bands
 from saltus_paper.claims.claim import Measured, measured
 from saltus_paper.figure_data import joined
 from saltus_paper.figures.figure import paper_figure

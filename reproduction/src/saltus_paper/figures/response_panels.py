@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from saltus.studies import bifurcation_diagram, response_spectrum
-from saltus.systems import System
+from saltus import System, bifurcation_diagram, response_spectrum
 from saltus.theory import critical_horizontal, equivalent_angle, static_angle
 from saltus_paper.figure_data import with_groups
 from saltus_paper.figures.closed_layer import closed_layer

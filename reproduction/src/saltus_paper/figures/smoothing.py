@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.flow import simulate, simulate_many
-from saltus.orbits import continue_orbit, find_orbit, switch_branch
-from saltus.systems import System
+from saltus import System, continue_orbit, find_orbit, simulate, simulate_many, switch_branch
 from saltus_paper.claims.claim import Measured, measured
 from saltus_paper.figure_data import dataset, joined, largest_angle
 from saltus_paper.figures.figure import paper_figure

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError
-from saltus.systems import LayerState, TwoLayer, name_impact, other_impulse, table_1
+from saltus import ParameterError, TwoLayer
+from saltus.systems import LayerState, name_impact, other_impulse, table_1
 from saltus_paper.claims.claim import Measured, measured, with_fields
 from saltus_paper.figure_data import dataset, tree
 from saltus_paper.figures.figure import paper_figure

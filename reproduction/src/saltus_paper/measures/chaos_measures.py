@@ -13,9 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.attractors import excludes_tori, share_interval
-from saltus.branch_tables import branches_of
-from saltus.systems import System
+from saltus import System, branches_of, excludes_tori
+from saltus.attractors import share_interval
 from saltus_paper.claims.claim import Measured, measured
 from saltus_paper.measures.response_measures import Panels
 from saltus_paper.measures.spectrum_features import amplitudes_at, count, stable_motions

@@ -13,9 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.branch_tables import branches_of
+from saltus import System, branches_of
 from saltus.plots import smooth_lines
-from saltus.systems import System
 from saltus_paper.claims.claim import Measured, measured
 from saltus_paper.measures.spectrum_features import (
     PROMINENT,

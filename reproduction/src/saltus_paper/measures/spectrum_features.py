@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.branch_tables import branch_of, branches_of
+from saltus import branch_of, branches_of
 from saltus.plots import BranchLine, branch_lines, smooth_lines
 
 PROMINENT = 0.05  # least height of a resonance above the minima beside it, as a share of the highest amplitude

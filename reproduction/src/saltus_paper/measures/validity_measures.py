@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.branch_tables import branches_of
+from saltus import branches_of
 from saltus.plots import ModelValidity, smooth_lines
 from saltus_paper.claims.claim import Measured, measured
 

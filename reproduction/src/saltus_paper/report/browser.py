@@ -9,7 +9,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from saltus.files import write_bytes
+from saltus import save
 
 BROWSERS = (
     *("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "microsoft-edge", "msedge", "chrome"),
@@ -49,8 +49,8 @@ def print_pdf(page: Path, pdf: Path, mark: Path) -> str | None:
             printed = made.read_bytes()
         except (OSError, subprocess.SubprocessError) as error:
             return f"{found} could not print {page.name} ({type(error).__name__}), so there is no {pdf.name}"
-    write_bytes(pdf, printed)
-    write_bytes(mark, _mark(content, pdf).encode())
+    save(pdf, printed)
+    save(mark, _mark(content, pdf))
     return None
 
 

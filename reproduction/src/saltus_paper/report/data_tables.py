@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import math
 import re
@@ -13,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError
-from saltus.files import checked_content
+from saltus import ParameterError
 from saltus_paper.toml_tables import toml_table
 
 ANGLES = ("beta0", "alpha")  # angles of the paper's models in rad, which are shown in degrees
@@ -50,7 +48,9 @@ class DataTables:
 
 
 def data_tables(path: Path) -> DataTables:
-    """The tables of a netCDF file that saltus has written; its checksum is compared first.
+    """The tables of a netCDF file that this package has written and whose fingerprint is that of its record.
+
+    It is read by h5netcdf, as `saltus.load` would also read all numbers of hundreds of groups.
 
     Raises
     ------
@@ -59,9 +59,8 @@ def data_tables(path: Path) -> DataTables:
     """
     import h5netcdf
 
-    content = checked_content(path)
     try:
-        with h5netcdf.File(io.BytesIO(content), "r") as file:
+        with h5netcdf.File(path, "r") as file:
             return _tables_of(file)
     except Exception as error:  # h5netcdf, HDF5 and forged attributes have many ways to say so
         raise ParameterError(f"{path} is no result of saltus that can be read ({error!s:.80}); compute it again") from error

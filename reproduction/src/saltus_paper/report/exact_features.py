@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import io
 from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
-
-from saltus.files import checked_content
 
 DIAGRAMS = ("fig09", "fig10", "fig11", "fig12", "fig13")
 CHARTS = ("fig14", "fig15")
@@ -46,7 +43,7 @@ def _rows(path: Path, title: str, mark: str, counted: Callable[[Any], tuple[str,
     """A row of counts for each panel: each group that has a child `mark`."""
     import h5netcdf
 
-    with h5netcdf.File(io.BytesIO(checked_content(path)), "r") as file:
+    with h5netcdf.File(path, "r") as file:
         return [(f"{title} ({name})", *counted(panel)) for name, panel in file.groups.items() if mark in panel.groups]
 
 

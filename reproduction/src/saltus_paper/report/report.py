@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import saltus
-from saltus.errors import ParameterError
-from saltus.files import check_writable, write_text
+from saltus import ParameterError
 from saltus_paper import up_to_date as state
 from saltus_paper.claims.claim import Claim, ClaimVerdict
 from saltus_paper.claims.claim_tables import Origin
@@ -19,6 +18,7 @@ from saltus_paper.claims.ledger import HEADINGS, ledger, tally, to_markdown
 from saltus_paper.errata import errata
 from saltus_paper.figures.figure import PaperFigure
 from saltus_paper.highlights import findings, validity
+from saltus_paper.output_folder import check_writable
 from saltus_paper.report.browser import print_pdf
 from saltus_paper.report.report_content import BEYOND, ReportContent, report_content
 from saltus_paper.toml_tables import toml_table
@@ -78,7 +78,7 @@ def _write(content: ReportContent, folder: Path) -> list[Claim]:
     for name, text in pages.items():
         path = folder / name
         if not path.exists() or path.read_text(encoding="utf-8") != text:
-            write_text(path, text)
+            saltus.save(path, text)
     return content.claims
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from saltus.files import read_dataset
+import saltus
 from saltus.flow import available_cores
 from saltus_paper import up_to_date as state
 from saltus_paper.claims.claim import Claim, with_summaries
@@ -155,7 +155,7 @@ def _part(figure: PaperFigure, claims: list[Claim], folder: Path, picture: Embed
 
 
 def _both_layers(folder: Path) -> dict[str, Any]:
-    data = read_dataset(folder / "both_layers.nc")
+    data: Any = saltus.load(folder / "both_layers.nc")
     return {
         "shares": {f"Fig. {name[3:].lstrip('0')}": share_table(data[name]) for name in ("fig09", "fig11")},
         "portraits": exact_portraits(data["portraits"]),

@@ -7,20 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow import simulate
-from saltus.systems import (
+from saltus import (
     EnergyRestitution,
     Harmonic,
     InelasticImpact,
-    LayerState,
     Load,
     Metainterface,
     RockingBlock,
     System,
     TwoLayer,
     VelocityReduction,
-    other_impulse,
+    simulate,
 )
+from saltus.systems import LayerState, other_impulse
 from saltus.theory import energy_factor, energy_jump, equilibria, total_energy
 from saltus_paper.claims.claim import Measured, measured, with_fields
 from saltus_paper.figure_data import scalar_dataset, scalars

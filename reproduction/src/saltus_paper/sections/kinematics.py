@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.systems import PhysicalCell, UnitCell
+from saltus import PhysicalCell, UnitCell
 from saltus_paper.claims.claim import Measured, measured, with_fields
 from saltus_paper.figure_data import scalar_dataset, scalars
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow import simulate, simulate_many
+from saltus import simulate, simulate_many
 from saltus_paper.claims.claim import Measured, measured, with_fields
 from saltus_paper.figure_data import TOLERANCE, largest_angle, scalar_dataset, scalars
 from saltus_paper.figures.harmonic_loads import DAMPING, under_force

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow import simulate
-from saltus.systems import Load, Metainterface, System, UnitCell
+from saltus import Load, Metainterface, System, UnitCell, simulate
 from saltus.theory import equilibria
 from saltus_paper.claims.claim import Measured, measured, with_fields
 from saltus_paper.figure_data import TOLERANCE, scalar_dataset, scalars

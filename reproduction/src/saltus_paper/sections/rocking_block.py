@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow import simulate
-from saltus.systems import Harmonic, Load, Metainterface, RockingBlock, System, VelocityReduction
+from saltus import Harmonic, Load, Metainterface, RockingBlock, System, VelocityReduction, simulate
 from saltus.theory import decayed_amplitude, final_time, housner_restitution, rocking_energy_jump, rocking_period
 from saltus_paper.claims.claim import Measured, measured, with_fields
 from saltus_paper.figure_data import scalars

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow import simulate
-from saltus.systems import Load, Metainterface, System, VelocityReduction
+from saltus import Load, Metainterface, System, VelocityReduction, simulate
 from saltus.theory import (
     Stability,
     equilibria,

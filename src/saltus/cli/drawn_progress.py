@@ -16,7 +16,22 @@ from saltus.progress import Progress
 def progress_bar(title: str) -> Iterator[Progress]:
     """A bar with a clock on a terminal; elsewhere a line on stderr whenever another step of the work begins.
 
-    Yields the `progress(fraction, what)` that the work calls; `what` names the step, and after a comma what changes in it.
+    The commands of saltus draw theirs in this way; a command that another package adds can do the same.
+
+    Parameters
+    ----------
+    title
+        What the work is, before the name of the step.
+
+    Yields
+    ------
+    Progress
+        The `progress(fraction, what)` that the work calls; `what` names the step, and after a comma what changes in it.
+
+    Examples
+    --------
+    >>> with saltus.cli.progress_bar("spectrum") as progress:
+    ...     ends = saltus.simulate_many(system, theta=[0.1, 0.3], periods=10, progress=progress)
     """
     messages, step = Console(stderr=True, highlight=False), ""
     columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), BarColumn(bar_width=20), TimeElapsedColumn())

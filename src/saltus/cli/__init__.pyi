@@ -1,0 +1,5 @@
+from .drawn_progress import progress_bar
+
+__all__ = ["main", "progress_bar"]
+
+def main() -> None: ...
