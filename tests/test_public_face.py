@@ -149,7 +149,6 @@ def good(made):
         "theory.linear_motion": {"system": UNFORCED, "theta0": 0.1, "impacts": 3},
         "theory.linear_period": {"theta0": 0.1, **angles},
         "theory.open_layer": {"system": UNFORCED, "side": 1},
-        "theory.paper_monostable": {"horizontal": 0.1, **angles},
         "theory.peaks": {"system": UNFORCED, "theta0": 0.1},
         "theory.pendulum_acceleration": {"system": LINEAR, "tau": 0.0, "theta": 0.1, "velocity": 0.0},
         "theory.potential_energy": {"system": UNFORCED, "theta": 0.1},

@@ -1,19 +1,26 @@
 from .bouncing import Peaks, peaks, reciprocal, unloaded_half_periods, unloaded_peak_ratio, unloaded_period
-from .energy import potential_energy, potential_slope, total_energy
 from .high_frequency import high_frequency_onset
 from .impact_oscillator import WallOrbit, WallOrbits, wall_orbits
-from .layer import Layer, layers, open_layer
-from .loaded_equilibria import LoadedEquilibrium, Stability, equilibria, undeformed_stability
+from .layer import Layer, layers, open_layer, potential_energy, potential_slope, total_energy
+from .loaded_equilibria import (
+    Divergence,
+    LoadedEquilibrium,
+    Stability,
+    divergence,
+    equilibria,
+    linear_equilibria,
+    undeformed_stability,
+)
 from .mechanism_limits import AmplitudeLimit, amplitude_limits
-from .pendulum import pendulum_acceleration
 from .piecewise_linear import LinearMotion, linear_motion
 from .quasi_static import (
+    QuasiStaticBorder,
     critical_horizontal,
     equivalent_angle,
     fold_curve,
     fold_horizontal,
     is_monostable,
-    paper_monostable,
+    quasi_static_border,
     static_angle,
     subcritical_vertical,
     unloaded_fold,
@@ -33,12 +40,11 @@ from .small_vibrations import (
     decayed_period,
     final_time,
     linear_period,
+    pendulum_acceleration,
     short_period,
     upright_period,
     vibrations,
 )
-from .static_border import QuasiStaticBorder, quasi_static_border
-from .static_divergence import Divergence, divergence, linear_equilibria
 
 __all__ = [
     "AmplitudeLimit",
@@ -74,7 +80,6 @@ __all__ = [
     "linear_motion",
     "linear_period",
     "open_layer",
-    "paper_monostable",
     "peaks",
     "pendulum_acceleration",
     "potential_energy",

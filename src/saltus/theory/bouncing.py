@@ -13,6 +13,7 @@ from saltus.checks import check_number
 from saltus.errors import ParameterError
 from saltus.public_functions import Numbers
 from saltus.systems import System
+from saltus.theory.arguments import check_shapes, numbers
 from saltus.theory.layer import Layer, layers
 from saltus.theory.loaded_equilibria import zeros_of_slope
 
@@ -233,12 +234,13 @@ def reciprocal(system: System, theta0: float) -> tuple[System, float]:
     >>> round(abs(theta), 12)  # equal layers: the same motion
     0.1
     """
+    check_number("theta0", theta0)
     lower, upper = layers(system)
     if lower.mass != upper.mass or lower.vertical != upper.vertical or lower.outward != -upper.outward:
         raise ParameterError("the reciprocity of the peak ratio is for m = 0 and forces on the upper mass only", "system")
     k = lower.stiffness
     changes = {"model.stiffness_ratio": 1 / k, "load.vertical": upper.vertical / k, "load.horizontal": upper.outward / k}
-    return system.with_(changes), -theta0
+    return system.with_(changes), -float(theta0)
 
 
 def _fall_speed(layer: Layer, peak: float) -> float:
@@ -261,7 +263,7 @@ def _after_impact(system: System, speed: float, side: int) -> float:
 
 
 def _check_ratios(stiffness_ratio: Any, mass_ratio: Any) -> None:
-    if not (np.all(np.asarray(stiffness_ratio) > 0) and np.all(np.asarray(mass_ratio) >= 0)):
-        raise ParameterError(
-            f"need stiffness_ratio > 0 and mass_ratio >= 0, got {stiffness_ratio!r} and {mass_ratio!r}", "stiffness_ratio"
-        )
+    check_shapes(
+        stiffness_ratio=numbers("stiffness_ratio", stiffness_ratio, above=0.0),
+        mass_ratio=numbers("mass_ratio", mass_ratio, at_least=0.0),
+    )

@@ -1,18 +1,24 @@
-"""Quasi-static loading: the monostable domain of the undeformed state with both of its borders, and static angles."""
+"""Quasi-static loading: the monostable domain of the undeformed state, the border of a chart by it, and static angles."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from saltus.checks import check_number
 from saltus.errors import ParameterError
 from saltus.public_functions import Numbers
-from saltus.systems import Load, Metainterface, System
+from saltus.result import Result
+from saltus.systems import Harmonic, Load, Metainterface, System
 from saltus.theory.layer import open_layer
 from saltus.theory.loaded_equilibria import zeros_of_slope
+
+if TYPE_CHECKING:
+    import xarray
+from saltus.theory.arguments import check_shapes, numbers
 
 
 def critical_horizontal(beta0: float, vertical: Numbers, swing: float = 0.0) -> Any:
@@ -42,11 +48,12 @@ def critical_horizontal(beta0: float, vertical: Numbers, swing: float = 0.0) -> 
     0.5
     """
     _check_angle(beta0)
-    if np.any(np.asarray(vertical) * math.cos(beta0) > 0):
+    vertical = numbers("vertical", vertical)
+    if np.any(vertical * math.cos(beta0) > 0):
         raise ParameterError(
             f"V cos(beta0) must not be above 0, or theta = 0 is unstable for every H; got V = {vertical!r}", "vertical"
         )
-    least = np.asarray(vertical, dtype=float) ** 2 - swing**2
+    least = vertical**2 - swing**2
     if np.any(least < 0):
         raise ParameterError(
             f"swing must be at most abs(V), or theta = 0 is lost without a horizontal load; got {swing!r}", "swing"
@@ -83,7 +90,7 @@ def fold_curve(beta0: float, opening: Numbers) -> tuple[Any, Any]:
     0.0
     """
     _check_angle(beta0)
-    opening = np.asarray(opening, dtype=float)
+    opening = numbers("opening", opening)
     if np.any((opening < 0) | (opening > math.pi - beta0)):
         raise ParameterError(f"the opening must lie in [0, {math.pi - beta0:.6g}] rad, the straight line", "opening")
     angle = beta0 + opening
@@ -154,7 +161,7 @@ def fold_horizontal(beta0: float, vertical: Numbers) -> Any:
     1.0
     """
     _check_angle(beta0, math.pi / 2)
-    vertical = np.asarray(vertical, dtype=float)
+    vertical = numbers("vertical", vertical)
     if np.any(vertical > -math.sin(beta0)):
         largest = -math.sin(beta0)
         raise ParameterError(
@@ -191,34 +198,13 @@ def is_monostable(beta0: float, horizontal: Numbers, vertical: Numbers) -> Any:
     True
     """
     _check_angle(beta0)
-    size, vertical = np.abs(np.asarray(horizontal, dtype=float)), np.asarray(vertical, dtype=float)
+    size, vertical = np.abs(numbers("horizontal", horizontal)), numbers("vertical", vertical)
+    check_shapes(horizontal=size, vertical=vertical)
     held = vertical * math.cos(beta0) < -size * math.sin(beta0)
     if beta0 < math.pi / 2:
         subcritical = vertical <= -math.sin(beta0)
         held = held & (~subcritical | (size < fold_horizontal(beta0, np.minimum(vertical, -math.sin(beta0)))))
     return held[()]
-
-
-def paper_monostable(beta0: float, horizontal: Numbers, vertical: Numbers) -> Any:
-    """The domain of Fig. 8, V cos(beta0) < -abs(H) sin(beta0): the undeformed state is stable there, but not always the only
-    equilibrium.
-
-    Parameters
-    ----------
-    beta0
-        The angle of the undeformed cell, rad, in (0, pi).
-    horizontal
-        The constant load H.
-    vertical
-        The constant load V.
-
-    Examples
-    --------
-    >>> bool(saltus.theory.paper_monostable(1.4, 0.0, -0.5))
-    True
-    """
-    _check_angle(beta0)
-    return np.asarray(vertical) * math.cos(beta0) < -np.abs(horizontal) * math.sin(beta0)
 
 
 def static_angle(beta0: float, horizontal: float, vertical: float) -> float:
@@ -279,7 +265,7 @@ def equivalent_angle(beta0: float, ground_amplitude: Numbers) -> Any:
     0.0
     """
     _check_angle(beta0)
-    amplitude, largest = np.asarray(ground_amplitude, dtype=float), 1 + math.cos(beta0)
+    amplitude, largest = numbers("ground_amplitude", ground_amplitude), 1 + math.cos(beta0)
     if not np.all((amplitude >= 0) & (amplitude <= largest)):
         raise ParameterError(
             f"zetahat must lie in [0, {largest:.6g}], that is 1 + cos(beta0), got {ground_amplitude!r}", "ground_amplitude"
@@ -289,3 +275,103 @@ def equivalent_angle(beta0: float, ground_amplitude: Numbers) -> Any:
 
 def _check_angle(beta0: float, below: float = math.pi) -> None:
     check_number("beta0", beta0, above=0.0, below=below, unit="rad")
+
+
+LOAD_PLANE = ("load.horizontal.amplitude", "load.vertical")  # the two parameters in whose plane the closed forms hold
+
+
+@dataclass(frozen=True, eq=False)
+class QuasiStaticBorder(Result):
+    """Both parts of the border over the vertical load V; the true border is the lower one (erratum 23).
+
+    Attributes
+    ----------
+    vertical
+        V, (n,).
+    critical
+        Hhat at which the undeformed state is lost: the paper's border.
+    fold
+        Hhat at the fold of deformed equilibria, nan where there is none.
+    subcritical_below
+        The V below which the fold comes first.
+
+    Examples
+    --------
+    >>> plane = ("load.horizontal.amplitude", "load.vertical")
+    >>> border = saltus.theory.quasi_static_border(system, plane, -1.0)
+    >>> bool(np.allclose(border.critical, np.abs(border.vertical) / np.tan(system.model.beta0)))
+    True
+    """
+
+    vertical: np.ndarray
+    critical: np.ndarray
+    fold: np.ndarray
+    subcritical_below: float
+
+    @property
+    def true(self) -> np.ndarray:
+        """The true border: the lower one of `critical` and `fold`."""
+        return np.asarray(np.fmin(self.critical, self.fold))
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The border as a Dataset along `vertical`."""
+        import xarray as xr
+
+        data = {
+            "critical": (self.critical, "Hhat at which the undeformed state is lost (the paper's border)"),
+            "fold": (self.fold, "Hhat at the fold of deformed equilibria (erratum 23)"),
+            "true": (self.true, "the lesser of both: the quasi-static border"),
+        }
+        variables = {name: ("vertical", values, {"units": "1", "long_name": text}) for name, (values, text) in data.items()}
+        axis = {"vertical": ("vertical", self.vertical, {"units": "1", "long_name": "V"})}
+        return xr.Dataset(variables, axis, {"subcritical_below": self.subcritical_below})
+
+
+def quasi_static_border(system: System, plane: tuple[str, ...], lowest: float) -> QuasiStaticBorder | None:
+    """The border over V from `lowest` to 0, or None where no closed form is known.
+
+    It is known for the metainterface with k = 1 and beta0 below 90 degrees, under H = Hhat sin and a constant V < 0 alone, in
+    the plane of Hhat and V.
+
+    Parameters
+    ----------
+    system
+        A metainterface under load (i).
+    plane
+        The dotted paths of the parameters along both axes, the horizontal one first.
+    lowest
+        The least V.
+
+    Examples
+    --------
+    >>> plane = ("load.horizontal.amplitude", "load.vertical")
+    >>> border = saltus.theory.quasi_static_border(system, plane, -1.0)
+    >>> float(border.vertical.min())
+    -1.0
+    """
+    model, channels = system.model, system.load.channels
+    if tuple(plane) != LOAD_PLANE or not isinstance(model, Metainterface):
+        return None
+    horizontal = channels.get("horizontal")
+    known = (
+        (model.stiffness_ratio, model.smoothing) == (1.0, None)
+        and model.beta0 < math.pi / 2
+        and set(channels) == {"horizontal", "vertical"}
+        and isinstance(horizontal, Harmonic)
+        and horizontal.mean == 0.0
+        and lowest < 0.0
+    )
+    return border_over(model.beta0, lowest) if known else None
+
+
+def border_over(beta0: float, lowest: float) -> QuasiStaticBorder:
+    """The border of the metainterface with k = 1 over V from `lowest` to 0."""
+    start, end = subcritical_vertical(beta0), unloaded_fold(beta0)[0]
+    bend = end + (start - end) * np.linspace(0.0, 1.0, 101) ** 0.5  # dense near V = start, where the fold leaves as a power 3/2
+    ends = [np.linspace(lowest, end, 21), bend, np.linspace(end, start, 101), np.linspace(start, 0.0, 21)]
+    vertical = np.unique(np.concatenate(ends))
+    vertical = vertical[vertical >= lowest]
+    fold = np.full_like(vertical, np.nan)
+    fold[vertical <= start] = fold_horizontal(beta0, vertical[vertical <= start])
+    fold[vertical <= end] = 0.0  # deformed equilibria exist without any horizontal load; this removes the rounding of 0
+    return QuasiStaticBorder(vertical, critical_horizontal(beta0, vertical), fold, start)

@@ -6,12 +6,11 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from saltus.checks import check_number
 from saltus.errors import ParameterError
 from saltus.public_functions import Numbers
 from saltus.systems import EnergyRestitution, System
+from saltus.theory.arguments import check_shapes, check_side, numbers
 from saltus.theory.layer import metainterface
 
 
@@ -101,20 +100,23 @@ def energy_factor(system: System, velocity: float, side: int, e: float, tau: flo
     side
         The side that the impact ends, +1 or -1.
     e
-        The factor of the velocity at an impact.
+        The factor of the velocity at an impact, at least 0; unequal masses or a moving ground may bring it above 1.
     tau
         The dimensionless time of the impact.
 
     Raises
     ------
     ParameterError
-        T- = 0; a model without kinetic energy.
+        T- = 0; a model without kinetic energy; e below 0; another side.
 
     Examples
     --------
     >>> float(saltus.theory.energy_factor(tristable, 0.3, 1, 0.9))  # e^2 on a ground at rest
     0.81
     """
+    check_side(side)
+    check_number("velocity", velocity)
+    check_number("e", e, at_least=0.0)
     before = float(system.model.kinetic_energy(tau, system.model.contact, velocity, side, system.load))
     if before == 0:
         raise ParameterError("r = T+ / T- has no meaning where the kinetic energy before the impact is 0", "velocity")
@@ -140,13 +142,16 @@ def velocity_factor(system: System, velocity: float, side: int, r: float, tau: f
     Raises
     ------
     ParameterError
-        velocity = 0, or an equation without a solution (errata 26); the error names the instant and the velocity.
+        velocity = 0, r outside (0, 1], another side, or an equation without a solution (errata 26), with the instant and the
+        velocity.
 
     Examples
     --------
     >>> round(float(saltus.theory.velocity_factor(tristable, 0.3, 1, 0.81)), 12)  # sqrt(r) on a ground at rest
     0.9
     """
+    check_side(side)
+    check_number("velocity", velocity)
     if velocity == 0:
         raise ParameterError("e = theta'+ / theta'- has no meaning at velocity 0", "velocity")
     after = float(EnergyRestitution(r).velocity_after(system.one_contact, tau, velocity, side, -side, system.load))
@@ -181,7 +186,7 @@ def energy_jump(system: System, velocity: Numbers, side: int, e: Numbers, tau: N
     Raises
     ------
     ParameterError
-        Another model.
+        Another model; e outside [0, 1]; another side.
 
     Examples
     --------
@@ -189,7 +194,9 @@ def energy_jump(system: System, velocity: Numbers, side: int, e: Numbers, tau: N
     -0.00375
     """
     model = metainterface(system)
-    velocity, e = np.asarray(velocity, dtype=float), np.asarray(e, dtype=float)
+    check_side(side)
+    velocity, e, tau = numbers("velocity", velocity), numbers("e", e, at_least=0.0, at_most=1.0), numbers("tau", tau)
+    check_shapes(velocity=velocity, e=e, tau=tau)
     zeta, nu = system.load.ground_horizontal.velocity(tau), system.load.ground_vertical.velocity(tau)
     before, after = (1 + model.mass_ratio, 1.0) if side > 0 else (1.0, 1 + model.mass_ratio)
     across = (before - after * e) * math.sin(model.beta0) * zeta

@@ -10,6 +10,7 @@ import numpy as np
 from saltus.checks import check_number
 from saltus.errors import ParameterError
 from saltus.public_functions import Numbers
+from saltus.theory.arguments import check_shapes, numbers
 
 
 def rocking_period(theta0: Numbers, *, alpha: float) -> Any:
@@ -118,7 +119,8 @@ def rocking_energy_jump(velocity: Numbers, *, alpha: float, e: float, ground_vel
     -0.00375
     """
     _check(alpha, e)
-    velocity, ground_velocity = np.asarray(velocity, dtype=float), np.asarray(ground_velocity, dtype=float)
+    velocity, ground_velocity = numbers("velocity", velocity), numbers("ground_velocity", ground_velocity)
+    check_shapes(velocity=velocity, ground_velocity=ground_velocity)
     return (-(1 - e) / 2 * ((1 + e) * velocity**2 + 2 * velocity * ground_velocity * math.cos(alpha)))[()]
 
 
@@ -146,7 +148,8 @@ def rocking_energy_decreases(velocity: Numbers, *, alpha: float, e: float, groun
     True
     """
     _check(alpha, e)
-    velocity, ground_velocity = np.asarray(velocity, dtype=float), np.asarray(ground_velocity, dtype=float)
+    velocity, ground_velocity = numbers("velocity", velocity), numbers("ground_velocity", ground_velocity)
+    check_shapes(velocity=velocity, ground_velocity=ground_velocity)
     slow_ground = np.abs(ground_velocity) < (1 + e) / (2 * math.cos(alpha)) * np.abs(velocity)
     return ((e < 1) & ((velocity * ground_velocity > 0) | slow_ground))[()]
 
@@ -183,7 +186,7 @@ def housner_restitution(alpha: float) -> float:
 
 def _amplitude(theta0: Any, alpha: float) -> Any:
     _check(alpha, 1.0)
-    size = np.abs(np.asarray(theta0, dtype=float))
+    size = np.abs(numbers("theta0", theta0))
     if not np.all(size < alpha):
         raise ParameterError(
             f"abs(theta0) must be below alpha = {alpha:.6g} rad, or the block overturns; got {theta0!r}", "theta0"

@@ -1,4 +1,4 @@
-"""Small free vibrations under a constant vertical load: frequencies, period, and its decay by impacts."""
+"""Small free vibrations under a constant vertical load: frequencies, period, decay by impacts; and the upright cell."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from saltus.checks import check_number
 from saltus.errors import ParameterError
 from saltus.public_functions import Numbers
 from saltus.systems import System
-from saltus.theory.layer import Layer, layers
+from saltus.theory.arguments import numbers
+from saltus.theory.layer import Layer, layers, metainterface
 
 UPRIGHT = 1e-15  # moments V cos(beta0) below this count as 0: they are the rounding of cos(pi/2)
 
@@ -111,7 +112,7 @@ def linear_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
     1.0
     """
     kappa, closing = _linear(beta0, vertical)
-    size = np.abs(np.asarray(theta0, dtype=float))
+    size = np.abs(numbers("theta0", theta0))
     if closing <= UPRIGHT:
         if closing < -UPRIGHT or kappa <= 0:
             raise ParameterError(
@@ -197,7 +198,7 @@ def upright_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
         raise ParameterError(
             f"this expansion needs V (pi/2 - beta0) below 0 and V other than -1, got V = {vertical!r}", "vertical"
         )
-    stretch = kappa * np.abs(np.asarray(theta0, dtype=float)) / closing
+    stretch = kappa * np.abs(numbers("theta0", theta0)) / closing
     if np.any(stretch <= -1):
         raise ParameterError(
             f"abs(theta0) must be below the saddle at {closing / -kappa:.6g} rad: beyond it the motion diverges", "theta0"
@@ -230,6 +231,7 @@ def decayed_amplitude(cycle: Numbers, *, theta0: float, e: float) -> Any:
     >>> float(saltus.theory.decayed_amplitude(2, theta0=1.0, e=0.5))  # e^4
     0.0625
     """
+    check_number("theta0", theta0)
     return theta0 * _factor(cycle, e) ** 4
 
 
@@ -250,13 +252,14 @@ def decayed_period(cycle: Numbers, *, period: float, e: float) -> Any:
     Raises
     ------
     ParameterError
-        e out of (0, 1], or n below 1.
+        e out of (0, 1], n below 1, or a period that is not above 0.
 
     Examples
     --------
     >>> float(saltus.theory.decayed_period(1, period=4.0, e=0.5))
     2.25
     """
+    check_number("period", period, above=0.0)
     return (1 + e) ** 2 / 4 * period * _factor(cycle, e) ** 2
 
 
@@ -273,13 +276,14 @@ def final_time(*, period: float, e: float) -> float:
     Raises
     ------
     ParameterError
-        e out of [0, 1): without losses the vibration goes on for ever.
+        e out of [0, 1): without losses the vibration goes on for ever; a period that is not above 0.
 
     Examples
     --------
     >>> saltus.theory.final_time(period=4.0, e=0.5)  # (1 + e) / (1 - e) quarters of the period
     3.0
     """
+    check_number("period", period, above=0.0)
     check_number("e", e, at_least=0.0, below=1.0)
     return (1 + e) / (4 * (1 - e)) * period
 
@@ -287,9 +291,7 @@ def final_time(*, period: float, e: float) -> float:
 def _factor(cycle: Any, e: float) -> Any:
     """e^(n-1)."""
     check_number("e", e, above=0.0, at_most=1.0)
-    if np.any(np.asarray(cycle) < 1):
-        raise ParameterError(f"cycles are counted from 1, got {cycle!r}", "cycle")
-    return e ** (np.asarray(cycle, dtype=float) - 1)
+    return e ** (numbers("cycle", cycle, at_least=1.0) - 1)
 
 
 def _linear(beta0: float, vertical: float) -> tuple[float, float]:
@@ -297,3 +299,44 @@ def _linear(beta0: float, vertical: float) -> tuple[float, float]:
     check_number("beta0", beta0, above=0.0, below=math.pi, unit="rad")
     check_number("vertical", vertical)
     return 1 + vertical * math.sin(beta0), -vertical * math.cos(beta0)
+
+
+def pendulum_acceleration(system: System, tau: Numbers, theta: Numbers, velocity: Numbers) -> Any:
+    """theta'' of the symmetric system at beta0 = pi/2 (`gov_eqn_special`), any shape and any loads:
+
+        theta'' + C theta' + theta = cos(theta) (H - zeta'') - sin(theta) (V - nu'')
+
+    The sign of theta drops out: sin(abs(theta) + pi/2) = cos(theta) and sgn(theta) cos(abs(theta) + pi/2) = -sin(theta),
+    so that with e = 1 an impact changes nothing.
+
+    Parameters
+    ----------
+    system
+        A symmetric metainterface with beta0 = pi/2.
+    tau
+        The dimensionless time; any shape.
+    theta
+        The coordinate, rad; any shape.
+    velocity
+        theta'; any shape.
+
+    Raises
+    ------
+    ParameterError
+        beta0 other than pi/2, unequal layers, or forces on the lower mass.
+
+    Examples
+    --------
+    >>> float(saltus.theory.pendulum_acceleration(linear, 0.0, 0.0, 0.0))
+    0.0
+    """
+    model, load = metainterface(system), system.load
+    if abs(model.beta0 - math.pi / 2) > 1e-15 or (model.stiffness_ratio, model.mass_ratio, model.dissipation_ratio) != (1, 0, 1):
+        raise ParameterError(f"the pendulum needs beta0 = pi/2 and equal layers (k = c = 1, m = 0), got {model!r}", "model.beta0")
+    if any(name.startswith("lower_") for name in load.channels):
+        raise ParameterError(
+            "the pendulum takes forces on the upper mass only; drop load.lower_horizontal and load.lower_vertical", "load"
+        )
+    across = load.horizontal(tau) - load.ground_horizontal.acceleration(tau)
+    along = load.vertical(tau) - load.ground_vertical.acceleration(tau)
+    return np.cos(theta) * across - np.sin(theta) * along - model.damping * np.asarray(velocity) - theta

@@ -13,7 +13,6 @@ from saltus.theory import (
     equilibria,
     fold_horizontal,
     is_monostable,
-    paper_monostable,
     subcritical_vertical,
     unloaded_fold,
 )
@@ -57,6 +56,11 @@ def _borders(beta0: float) -> Any:
     )
 
 
+def printed_domain(beta0: float, horizontal: Any, vertical: Any) -> Any:
+    """Where V cos(beta0) < -abs(H) sin(beta0), as printed: theta = 0 is stable there, but not always the only equilibrium."""
+    return vertical * np.cos(beta0) < -np.abs(horizontal) * np.sin(beta0)
+
+
 def _paths(beta0: float, loads: tuple[tuple[float, float, float], ...], what: str) -> Any:
     phase = np.linspace(0, 2 * np.pi, 241)
     rows, systems = [], []
@@ -71,7 +75,7 @@ def _paths(beta0: float, loads: tuple[tuple[float, float, float], ...], what: st
             "horizontal": (("path", "phase"), horizontal, "1", "H"),
             "vertical": (("path", "phase"), vertical, "1", "V"),
             "within": ("path", is_monostable(beta0, horizontal, vertical).all(axis=1), "1", "all of the path in the true domain"),
-            "within_printed": ("path", paper_monostable(beta0, horizontal, vertical).all(axis=1), "1", "in the printed domain"),
+            "within_printed": ("path", printed_domain(beta0, horizontal, vertical).all(axis=1), "1", "in the printed domain"),
             "held": ("path", [_held(s) for s in systems], "1", "rests in all"),
             "deformed": ("path", [_most_deformed(beta0, *row) for row in rows], "1", "deformed equilibria under its loads"),
             "system": ("path", np.array(systems), "1", "the System as JSON"),
