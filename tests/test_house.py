@@ -31,7 +31,6 @@ SHARED = {
     "provenance",
     "window",
     "public_functions",
-    "branch_lines",
     "branch_tables",
     "_front_door",
 }  # what every room may import

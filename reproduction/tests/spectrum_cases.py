@@ -3,7 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from saltus import branch_tables
+from saltus.branch_tables import branch_tables
 
 KINDS = {"straight": "landmark", "reaction": "assumption", "reach": "limit"}  # of the margins of these diagrams
 

@@ -9,7 +9,7 @@ import xarray as xr
 from claim_verdicts import verdicts
 from scipy.integrate import solve_ivp
 
-from saltus import branch_tables
+from saltus.branch_tables import branch_tables
 from saltus.orbits import continue_orbit, find_orbit
 from saltus_paper import FIGURES, ClaimVerdict
 from saltus_paper.figures.harmonic_loads import AMPLITUDE, under_force

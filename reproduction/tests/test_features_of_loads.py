@@ -10,7 +10,7 @@ from spectrum_cases import branch, diagram, folded, loop
 from test_errata import crossings
 
 import saltus
-from saltus import branch_tables
+from saltus.branch_tables import branch_tables
 from saltus.theory import critical_horizontal
 from saltus_paper import ClaimVerdict
 from saltus_paper.figures import fig13

@@ -9,7 +9,7 @@ from claim_verdicts import claims_of
 from spectrum_cases import branch, diagram
 
 import saltus
-from saltus import branch_tables
+from saltus.branch_tables import branch_tables
 from saltus_paper import ClaimVerdict
 from saltus_paper.figures.closed_layer import closed_layer
 from saltus_paper.figures.harmonic_loads import AMPLITUDE, under_force

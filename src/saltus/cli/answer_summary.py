@@ -38,7 +38,7 @@ def _chart(data: Any) -> Iterator[str]:
 
 def _borders(tree: Any) -> Iterator[str]:
     """What is known of the changes between neighbouring cells."""
-    from saltus.plots.branch_cuts import border_curves
+    from saltus.plots import border_curves
 
     left, kinds = tree["disagreements"].to_dataset(), [str(curve.attrs["kind"]) for curve in border_curves(tree)]
     curves = ", ".join(f"{kinds.count(kind)} {kind}" for kind in sorted(set(kinds))) or "none"
