@@ -266,7 +266,8 @@ def _of(cls):
     if hasattr(cls.__init__, "answers") and _arguments(cls) and not issubclass(cls, Result):
         yield cls.__name__
     for name, method in inspect.getmembers(cls, inspect.isroutine):
-        if name.startswith("_") or not callable(method) or not _arguments(method) or not method.__module__.startswith("saltus"):
+        own = str(getattr(method, "__module__", "")).startswith("saltus")  # those of an enumeration of integers are Python's
+        if name.startswith("_") or not callable(method) or not own or not _arguments(method):
             continue
         if not issubclass(cls, FORMULAS):
             yield f"{cls.__name__}.{name}"

@@ -110,8 +110,9 @@ WITHOUT = {
     "studies.wrong_cells": NUMBER,
     "studies.disagreements": "gives a part of what studies.bordered_chart gives",
     "studies.with_borders": "gives a part of what studies.bordered_chart gives",
+    "saltus.branches_of": "gives branches, each as saltus.branch_of does",
     "orbits.orbits_of": "gives orbits, each as saltus.find_orbit does",
     **dict.fromkeys(("saltus.load", "saltus.load_study", "saltus.to_mat", "saltus.plot", "saltus.register"), WRITES),
-    **dict.fromkeys(("saltus.show_progress", "sweep.remove_store", "sweep.status"), WRITES),
+    **dict.fromkeys(("saltus.save", "saltus.show_progress", "sweep.remove_store", "sweep.status"), WRITES),
     **dict.fromkeys(("sweep.open_store", "sweep.run"), STORE),
 }

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from functools import wraps
 from inspect import signature
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 import matplotlib as mpl
 import numpy as np
@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 
 from saltus.checks import check_number
 from saltus.errors import ParameterError, SaltusError, shown
-from saltus.public_functions import answered
+from saltus.public_functions import answered, bound_arguments
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -160,7 +160,7 @@ def panel_label(ax: Any, label: str) -> None:
 NARROWEST, WIDEST = 10.0, 2000.0  # mm, of a picture: from a stamp to the widest poster
 
 
-def drawing(draw: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[Any, P], R]:
+def drawing(draw: Callable[P, R]) -> Callable[P, R]:
     """A decorator of functions that draw a dataset in the conventions: arguments of a wrong kind are refused by their names.
 
     Users can change datasets: if one lacks something, or its arrays do not fit one another, the error of NumPy or Matplotlib is
@@ -170,13 +170,15 @@ def drawing(draw: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[Any,
 
     @answered
     @wraps(draw)
-    def inside(dataset: Any, /, *given: P.args, **named: P.kwargs) -> R:
+    def inside(*given: P.args, **named: P.kwargs) -> R:
+        arguments = bound_arguments(draw, given, named).arguments
+        dataset = arguments[name]
         if not hasattr(dataset, "attrs") or not hasattr(dataset, "data_vars"):
             raise ParameterError(f"{name} must be a Dataset or a DataTree, got {shown(dataset)}", name)
-        if named.get("width") is not None:
-            check_number("width", named["width"], at_least=NARROWEST, at_most=WIDEST, unit="mm")
+        if arguments.get("width") is not None:
+            check_number("width", arguments["width"], at_least=NARROWEST, at_most=WIDEST, unit="mm")
         try:
-            return drawn(dataset, *given, **named)
+            return drawn(*given, **named)
         except (SaltusError, OSError, MemoryError):
             raise
         except Exception as error:
