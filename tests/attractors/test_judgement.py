@@ -46,7 +46,7 @@ def test_a_transient_is_one_and_its_life_is_that_of_an_ensemble():
     late = late[late > 300]
     life = (late - 300).sum() / (late < 3000).sum()
     assert len(late) > 100
-    assert found.life[0] == pytest.approx(life, rel=0.6)
+    assert found.mean_life[0] == pytest.approx(life, rel=0.6)
 
 
 def test_what_companions_settle_on_repeats_itself():
@@ -103,13 +103,13 @@ def test_chaos_that_was_judged_before_is_judged_on_from_there():
     """What an earlier judgement has shown counts: its exponent stays, and fewer forcing periods exclude the same life."""
     system, value = forced(0.2), np.array([0.38])
     first = judge(system, unsettled_states(system, FREQUENCY, 0.38)[:, :16], {FREQUENCY: value}, settings=BRIEF)
-    known = EarlierJudgement(first.exponent, first.error, 3.0 * first.life)
+    known = EarlierJudgement(first.exponent, first.error, 3.0 * first.mean_life)
     careful = replace(BRIEF, exposure=20_000, rounds=3)
     found = judge(system, first.states, {FREQUENCY: value}, settings=careful, earlier=known)
     assert first.ending.tolist() == found.ending.tolist() == [Ending.CHAOTIC]
     assert found.exponent[0] == first.exponent[0]
-    assert 3.0 * first.life[0] >= BRIEF.exposure
-    assert 20_000 <= 3.0 * found.life[0] < 20_000 + BRIEF.companions * BRIEF.round_periods
+    assert 3.0 * first.mean_life[0] >= BRIEF.exposure
+    assert 20_000 <= 3.0 * found.mean_life[0] < 20_000 + BRIEF.companions * BRIEF.round_periods
 
 
 def test_an_earlier_judgement_that_was_wrong_is_corrected():

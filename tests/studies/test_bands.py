@@ -84,12 +84,12 @@ def test_bands_exclude_long_transients_and_the_more_so_beside_transients():
     tried, beside, longest = found.tried, 0, CHAOS.judgements[-1].exposure / 3.0
     for band in found.bands:
         within = (tried.values >= band.low) & (tried.values <= band.high)
-        assert 3.0 * tried.life[within].sum() >= CHAOS.judgements[1].exposure
+        assert 3.0 * tried.mean_life[within].sum() >= CHAOS.judgements[1].exposure
         for edge in (band.lower, band.upper):
             inner, outer = np.searchsorted(tried.values, [edge.inner, edge.outer])
             if tried.verdict[outer] == Ending.TRANSIENT:
-                assert tried.life[inner] >= min(CHAOS.longer * tried.life[outer], longest)
-                beside += tried.life[outer] > 1000.0
+                assert tried.mean_life[inner] >= min(CHAOS.longer * tried.mean_life[outer], longest)
+                beside += tried.mean_life[outer] > 1000.0
     assert beside  # such transients are longer than those that the first judgement excludes
 
 
@@ -185,7 +185,7 @@ def test_an_interval_at_whose_ends_no_motion_is_left_to_begin_with_is_halved_all
     """There a motion of a long period was judged, of which no state is kept as settled: such an interval was tried for ever."""
     search = BandSearch(DiagramWork(forced(0.2), FREQUENCY), (0.0, 1.0))
     for value in (0.5, 0.5005):
-        search.place(value).period = CHAOS.long_period + 1
+        search.entry(value).period = CHAOS.long_period + 1
     search.refine()
-    values = [place.value for place in search.places]
+    values = [place.value for place in search.entries]
     assert values == pytest.approx([0.5, 0.50025, 0.5005], rel=1e-9)

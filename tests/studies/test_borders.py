@@ -15,7 +15,7 @@ from saltus.studies import Borders, bordered_chart, disagreements, stability_cha
 from saltus.studies.chart.border_curves import curve_dataset, explained
 from saltus.studies.chart.changes import ChangeOutcome, Ways, changes_of, keys_of, read_chart, trace
 from saltus.studies.chart.chart_checks import sampled_ends
-from saltus.studies.chart.follow import lost
+from saltus.studies.chart.follow import stability_loss
 from saltus.studies.chart.motions import motion_type
 from saltus.systems import System, VelocityReduction
 from saltus.theory import high_frequency_onset, unloaded_fold
@@ -139,12 +139,12 @@ def test_the_point_where_stability_is_lost_is_found_from_its_stable_end():
     for target in (0.06, 0.25):
         branch = follow_stable(orbit, H, target)
         assert branch.points[-1].parameter == target
-        assert "no loss" in lost(branch)
-    special = lost(towards_the_onset())
+        assert "no loss" in stability_loss(branch)
+    special = stability_loss(towards_the_onset())
     assert special.kind == "LP"
     assert special.parameter == pytest.approx(0.0219879514, abs=1e-10)
     unstable = towards_the_onset().points[-1].orbit
-    assert lost(follow_stable(unstable, H, 0.023)) == "the orbit is not stable to its multipliers"
+    assert stability_loss(follow_stable(unstable, H, 0.023)) == "the orbit is not stable to its multipliers"
 
 
 def test_the_stable_part_of_a_branch_is_that_of_the_whole_one():
@@ -275,7 +275,7 @@ def test_a_curve_explains_only_what_ends_on_it():
 
 
 def test_a_curve_is_told_in_the_order_of_the_charts_axes():
-    locus = continue_special(lost(towards_the_onset()), V, bounds=(-0.6, -0.4), first_bounds=(0.02, 0.04))
+    locus = continue_special(stability_loss(towards_the_onset()), V, bounds=(-0.6, -0.4), first_bounds=(0.02, 0.04))
     told = curve_dataset(locus, [H, V])
     turned = curve_dataset(locus, [V, H])
     np.testing.assert_array_equal(told["vertical"], turned["horizontal"])

@@ -34,7 +34,9 @@ def test_a_row_of_fig_14_and_the_diagram_along_it_have_chaos_at_the_same_values(
     bands = search.bands
     in_diagram = np.array([any(value in band for band in bands.bands) for value in values])
     at = np.searchsorted(bands.tried.values, values)
-    long_transient = (bands.tried.verdict[at] == Ending.TRANSIENT) & (bands.tried.life[at] > 1000.0)  # a chart looks less long
+    long_transient = (bands.tried.verdict[at] == Ending.TRANSIENT) & (
+        bands.tried.mean_life[at] > 1000.0
+    )  # a chart looks less long
     left_open = (open_ & (row["verdict"].values == Ending.UNDECIDED)) | bands.tried.undecided[at] | long_transient
     assert in_diagram.any()
     assert not in_diagram.all()

@@ -277,4 +277,4 @@ def test_impacts_that_die_away_are_not_counted_where_chaos_is_looked_for():
             peaks=none,
         )
     )
-    assert search.place(0.5).kinds == {(1, 0), (1, 2), (1, 3)}
+    assert search.entry(0.5).kinds == {(1, 0), (1, 2), (1, 3)}

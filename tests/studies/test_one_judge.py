@@ -7,7 +7,7 @@ from shared_systems import forced
 from saltus import classify, find_attractors, stability_chart
 from saltus.flow import Ending
 from saltus.studies.diagram.diagram_work import DiagramWork
-from saltus.studies.diagram.searched_range import Begun, SearchedRange
+from saltus.studies.diagram.searched_range import MotionStarts, SearchedRange
 
 AMPLITUDE = "load.horizontal.amplitude"
 MOTIONS = {
@@ -48,7 +48,9 @@ def by_chart(system, window):
 def by_diagram(system, window):
     value = system.get(AMPLITUDE)
     search = SearchedRange(DiagramWork(system, AMPLITUDE), (0.9 * value, 1.1 * value))
-    search.follow([Begun(value, states_within(system, window), care=2)])  # as bands are judged where transients are near
+    search.simulate_starts(
+        [MotionStarts(value, states_within(system, window), level=2)]
+    )  # as bands are judged where transients are near
     return Ending(search.tried().verdict[0])
 
 

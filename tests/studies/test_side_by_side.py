@@ -15,7 +15,7 @@ from saltus.progress import growing, silent
 from saltus.studies.diagram import side_by_side as module
 from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.effort import EFFORTS, Effort
-from saltus.studies.diagram.searched_range import Begun, SearchedRange
+from saltus.studies.diagram.searched_range import MotionStarts, SearchedRange
 from saltus.studies.diagram.side_by_side import all_at_once, side_by_side
 
 AMPLITUDE = "load.horizontal.amplitude"
@@ -42,12 +42,12 @@ def test_a_diagram_does_not_depend_on_whether_its_parts_run_at_the_same_time(cor
         xr.testing.assert_identical(diagrams[0][path].to_dataset(), diagrams[1][path].to_dataset())
 
 
-def test_values_that_are_judged_with_different_care_at_the_same_time_have_the_same_verdicts(cores):
+def test_values_that_are_judged_with_different_level_at_the_same_time_have_the_same_verdicts(cores):
     states, found = np.random.default_rng(3).uniform(-0.5, 0.5, (4, 2)), []
     for count in (1, 2):
         cores(count)
         search = SearchedRange(DiagramWork(forced(1.0), AMPLITUDE), (1.74, 1.77))
-        search.follow([Begun(1.755, states, 0), Begun(1.76, states, 1), Begun(1.765, states, 0)])
+        search.simulate_starts([MotionStarts(1.755, states, 0), MotionStarts(1.76, states, 1), MotionStarts(1.765, states, 0)])
         found.append(search.tried())
     assert (found[0].verdict == Ending.CHAOTIC).sum() >= 2
     for one, other in zip(*(vars(tried).values() for tried in found), strict=True):

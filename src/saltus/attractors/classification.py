@@ -137,7 +137,7 @@ class _Case:
         """How the judge looks at a motion that has not settled: for periods as long as are asked for."""
         return replace(JUDGEMENT, longest_period=max(JUDGEMENT.longest_period, self.max_period))
 
-    def follow(self, state: np.ndarray, periods: int, part: tuple[float, float]) -> Recurrence:
+    def ends_of(self, state: np.ndarray, periods: int, part: tuple[float, float]) -> Recurrence:
         """How the motion from a state (d,) ends within so many forcing periods; `part` is the share of the progress."""
         kept = min(periods, max(self.periods, 4 * self.max_period))
         return find_recurrence(
@@ -227,7 +227,7 @@ def classify(
     check_count("seed", seed, 0)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     case = _Case(system, clock, int(periods), int(max_period), int(seed), float(tol), progress)
-    ends = case.follow(start[0], int(transient + periods), (0.0, 0.3))
+    ends = case.ends_of(start[0], int(transient + periods), (0.0, 0.3))
     verdict = _settled(case, ends, start[0]) or _judged(case, ends)
     progress(1.0, "verdict")
     return verdict
@@ -300,7 +300,7 @@ def _judged(case: _Case, ends: Recurrence) -> Verdict:
         return case.undecided(Reason.SELF_EXCITED if case.system.model.frictions else Reason.CONSERVATIVE, ends, {})
     states = ends.states[:, -JUDGEMENT.companions :]
     answer = judge(case.system, states, {}, settings=case.settings, progress=part_of(case.progress, 0.3, 0.6))
-    before, later = round(float(ends.periods[0])), case.follow(ends.states[0, -1], case.periods, (0.6, 0.7))
+    before, later = round(float(ends.periods[0])), case.ends_of(ends.states[0, -1], case.periods, (0.6, 0.7))
     evidence = _evidence(answer)
     after_all = _settled(case, later, ends.states[0, -1])
     if after_all is not None:
@@ -326,8 +326,8 @@ def _evidence(answer: Judged) -> dict[str, Any]:
         "largest_exponent_error": float(answer.error[0]),
         "exponent_resolution": float(answer.resolution[0]),
         "companions": JUDGEMENT.companions,
-        "companions_settled": int(answer.gone[0]),
-        "life": float(answer.life[0]),
+        "companions_settled": int(answer.settled_count[0]),
+        "life": float(answer.mean_life[0]),
     }
 
 

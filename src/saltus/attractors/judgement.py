@@ -66,7 +66,7 @@ class EarlierJudgement:
 
     exponent: np.ndarray  # (n,): the largest exponent, which is surely above 0
     error: np.ndarray  # (n,): half width of its 95 % interval
-    quiet: np.ndarray  # (n,): forcing periods of companions, in all, in which none has settled
+    periods_without_settling: np.ndarray  # (n,): forcing periods of companions, in all, in which none has settled
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +79,8 @@ class Judged:
     error: np.ndarray  # (n,): half width of its 95 % interval
     resolution: np.ndarray  # (n,): 2 ln(t) / t, which regular motion may show after the time of the run
     zero_one: np.ndarray  # (n,): K of the 0-1 test by which a torus is one; else nan
-    gone: np.ndarray  # (n,): how many companions have settled, or were ended by a limit of the model
-    life: np.ndarray  # (n,): mean life of a transient in forcing periods; of chaos the mean life that is excluded with 95 %
+    settled_count: np.ndarray  # (n,): how many companions have settled, or were ended by a limit of the model
+    mean_life: np.ndarray  # (n,): mean life of a transient in forcing periods; of chaos the mean life that is excluded with 95 %
     period: np.ndarray  # (n,): forcing periods after which a periodic motion repeats itself, 0 if that is not known
     states: np.ndarray  # (n, companions, d): the last stroboscopic states, of survivors where there are any
     settled: SettledLater  # what companions settled on
@@ -92,7 +92,7 @@ class Judged:
         """The reason of an answer in words; `torus` is added where it is not known whether a motion is regular."""
         exponent, error, least = (float(values[row]) for values in (self.exponent, self.error, self.resolution))
         seen = f"its largest exponent is {exponent:.4g} +- {error:.1g}, where regular motion may show {least:.1g}"
-        numbers = {"gone": int(self.gone[row]), "life": float(self.life[row]), "period": int(self.period[row])}
+        numbers = {"gone": int(self.settled_count[row]), "life": float(self.mean_life[row]), "period": int(self.period[row])}
         return Reason(self.reason[row]).sentence.format(
             seen=seen if np.isfinite(exponent) else "it looks like chaos for a while",
             torus=torus,
@@ -167,14 +167,15 @@ def judge(
     """
     run = _Judgement(system, states, parameters, settings)
     if earlier is None:
-        run.follow(settings.first_periods, part_of(progress, 0.0, 0.2, "judging"))
+        run.do_round(settings.first_periods, part_of(progress, 0.0, 0.2, "judging"))
         run.measure()
     else:
         run.go_on_from(earlier)
     for i in range(settings.rounds):
         open_chaos = run.positive & ~run.lasts & ~run.steady & run.may_last(settings.rounds - i)
-        run.open &= open_chaos | (~run.positive & ~run.negative & (run.gone > 0))
-        run.follow(settings.round_periods, part_of(progress, *(0.3 + 0.7 * n / settings.rounds for n in (i, i + 1)), "judging"))
+        run.open &= open_chaos | (~run.positive & ~run.negative & (run.settled_count > 0))
+        begin, end = (0.3 + 0.7 * number / settings.rounds for number in (i, i + 1))
+        run.do_round(settings.round_periods, part_of(progress, begin, end, "judging"))
     run.look_for_long_periods(~run.all_gone)
     run.look_for_tori()
     progress(1.0, "judging")
@@ -197,7 +198,9 @@ class _Judgement:
         self.positive, self.negative = np.zeros((2, n), dtype=bool)  # whether the exponent is surely above, or below 0
         self.all_gone, self.looked = np.zeros((2, n), dtype=bool)  # whether no companion is left; whether long periods were tried
         self.exponent, self.error, self.resolution, self.zero_one = np.full((4, n), np.nan)
-        self.gone, self.ended = np.zeros((2, n), dtype=int)  # companions that have settled or ended; of these, by a limit
+        self.settled_count, self.ended = np.zeros(
+            (2, n), dtype=int
+        )  # companions that have settled or ended; of these, by a limit
         self.exposure = np.zeros(n, dtype=int)  # forcing periods for which companions were followed, added up
         self.before = np.zeros(n, dtype=int)  # the exposure up to the end of the last round in which any settled
         self.period, self.rounds = np.zeros((2, n), dtype=int)
@@ -206,7 +209,11 @@ class _Judgement:
 
     def go_on_from(self, earlier: EarlierJudgement) -> None:
         """Go on from what a less careful judgement has shown."""
-        self.exponent, self.error, self.exposure = earlier.exponent.copy(), earlier.error.copy(), earlier.quiet.astype(int)
+        self.exponent, self.error, self.exposure = (
+            earlier.exponent.copy(),
+            earlier.error.copy(),
+            earlier.periods_without_settling.astype(int),
+        )
         self.positive[:] = True
 
     def _ends(self, rows: np.ndarray, states: np.ndarray, periods: int, progress: Progress, **options: Any) -> Recurrence:
@@ -223,7 +230,7 @@ class _Judgement:
             **options,
         )
 
-    def follow(self, periods: int, progress: Progress) -> None:
+    def do_round(self, periods: int, progress: Progress) -> None:
         """Follow companions for a round: those that settle are counted, and survivors take their places."""
         rows = np.flatnonzero(self.open)
         if not rows.size:
@@ -236,7 +243,7 @@ class _Judgement:
         self.history[:, self.rounds[rows], rows] = left, followed
         self.rounds[rows] += 1
         self.exposure[rows] += followed
-        self.gone[rows] += left
+        self.settled_count[rows] += left
         self.ended[rows] += ends.ended.reshape(shape).sum(axis=1)
         self.before[rows] = np.where(left > 0, self.exposure[rows], self.before[rows])
         for i, row in enumerate(rows):
@@ -253,7 +260,7 @@ class _Judgement:
     @property
     def _lacking(self) -> np.ndarray:
         """The further exposure in which none may settle until a transient is excluded, (n,)."""
-        life = self.before / np.maximum(self.gone, 1)
+        life = self.before / np.maximum(self.settled_count, 1)
         return np.asarray(np.maximum(self.settings.exposure, 3.0 * life) - (self.exposure - self.before))
 
     @property
@@ -267,7 +274,7 @@ class _Judgement:
     def may_last(self, rounds: int) -> np.ndarray:
         """Where so many more rounds may exclude a transient, or may show enough settled companions to call it one, (n,)."""
         within = self._lacking <= rounds * self.settings.round_periods * self.settings.companions
-        return np.asarray(within | (self.gone < self.settings.settled))
+        return np.asarray(within | (self.settled_count < self.settings.settled))
 
     def _keep_settled(self, rows: np.ndarray, ends: Recurrence) -> None:
         """Keep the motions on which companions have settled."""
@@ -334,8 +341,8 @@ class _Judgement:
         ending, reason = np.full(n, Ending.UNDECIDED), np.full(n, Reason.NOT_SURE)
         lasts = self.positive & ~self.all_gone & self.lasts
         some = self.positive & ~self.lasts
-        cut = self.all_gone & (self.ended == self.gone)
-        transient = (self.all_gone & ~cut) | (some & (self.gone >= self.settings.settled))
+        cut = self.all_gone & (self.ended == self.settled_count)
+        transient = (self.all_gone & ~cut) | (some & (self.settled_count >= self.settings.settled))
         reason[some], reason[np.isnan(self.exponent)] = Reason.FEW_SETTLED, Reason.NO_EXPONENTS
         reason[cut] = Reason.LIMIT
         repeats, together = (self.period > 0) & ~self.all_gone, self.negative & ~self.all_gone
@@ -348,9 +355,9 @@ class _Judgement:
         ):
             ending[chosen], reason[chosen] = kind, why
         with np.errstate(divide="ignore"):
-            life = np.where(lasts, (self.exposure - self.before) / 3.0, self.exposure / self.gone)
-        found = {name: getattr(self, name) for name in ("exponent", "error", "resolution", "zero_one", "gone", "period")}
-        return Judged(ending, reason, life=life, states=self.states, settled=self.settled, **found)
+            life = np.where(lasts, (self.exposure - self.before) / 3.0, self.exposure / self.settled_count)
+        found = {name: getattr(self, name) for name in ("exponent", "error", "resolution", "zero_one", "settled_count", "period")}
+        return Judged(ending, reason, mean_life=life, states=self.states, settled=self.settled, **found)
 
 
 def _companions(system: System, states: np.ndarray, settings: JudgementSettings) -> np.ndarray:

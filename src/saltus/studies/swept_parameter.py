@@ -89,7 +89,7 @@ class SweepRequest:
             check_number(name, value)
         return np.concatenate([position, np.broadcast_to(speeds, len(names))])
 
-    def follow(self, value: float, state: np.ndarray) -> Recurrence:
+    def end_at_value(self, value: float, state: np.ndarray) -> Recurrence:
         """What becomes of a state at phase 0 at one value of the parameter."""
         return find_recurrence(
             self.system.with_({self.path: float(value)}),
@@ -218,7 +218,7 @@ def _swept(asked: SweepRequest, values: np.ndarray, state: np.ndarray, progress:
     run = _OneWay(values, state, [])
     for i, value in enumerate(values):
         progress(i / len(values))
-        row = asked.follow(value, state)
+        row = asked.end_at_value(value, state)
         if row.ended[0]:
             break
         run.rows.append(row)
@@ -246,7 +246,7 @@ def _located(asked: SweepRequest, run: _OneWay, i: int) -> tuple[float, float, f
         while low != last:
             here = low + (last - first) / parts
             here = last if abs(here - last) < 0.5 * abs(last - first) / parts else here
-            row = asked.follow(here, state)
+            row = asked.end_at_value(here, state)
             if row.ended[0]:
                 return found
             size = amplitude_of(row)

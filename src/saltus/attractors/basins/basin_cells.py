@@ -146,9 +146,9 @@ class Grid:
     @property
     def states(self) -> np.ndarray:
         """The initial states, (rows, columns, d)."""
-        return self.at(*np.meshgrid(self.horizontal, self.vertical))
+        return self.states_over(*np.meshgrid(self.horizontal, self.vertical))
 
-    def at(self, horizontal: np.ndarray, vertical: np.ndarray) -> np.ndarray:
+    def states_over(self, horizontal: np.ndarray, vertical: np.ndarray) -> np.ndarray:
         """The states (..., d) at places of the plane."""
         varied = dict(zip(self.plane, (horizontal, vertical), strict=True))
         each = [varied.get(name, value) for name, value in self.fixed.items()]

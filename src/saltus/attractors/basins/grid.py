@@ -196,7 +196,7 @@ def _with_new(found: Attractors, labelling: Labelling, grid: Grid, label: np.nda
         rows, columns = np.nonzero((label == UNDECIDED) & ~seen)
         if not rows.size:
             break
-        states = grid.at(grid.horizontal[columns], grid.vertical[rows])
+        states = grid.states_over(grid.horizontal[columns], grid.vertical[rows])
         chosen = np.linspace(0, rows.size - 1, min(SETTINGS.new_states, rows.size)).astype(int)
         seen[rows[chosen], columns[chosen]] = True
         more = find_attractors(found.system, starts=1, also=states[chosen], tol=labelling.tol)

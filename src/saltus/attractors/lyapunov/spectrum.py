@@ -311,7 +311,7 @@ def lyapunov_spectrum(
     motion = simulate(system, **start, duration=transient * run.length, tol=tol, dense=False)
     run.state, run.note = state_of(motion), _lost(motion)
     share = 0.6 if two_trajectories else 1.0
-    run.follow(tol, part_of(progress, 0.0, share))
+    run.stretch_frames(tol, part_of(progress, 0.0, share))
     growth = np.full(LYAPUNOV.batches, np.nan)
     if two_trajectories and run.note is None:
         growth = separation_growth(system, state_of(motion), periods, run.length, part_of(progress, share, 1.0))
@@ -330,7 +330,7 @@ class _Run:
         self.state: dict[str, Any] = {}
         self.note: str | None = None
 
-    def follow(self, tol: float, progress: Progress) -> None:
+    def stretch_frames(self, tol: float, progress: Progress) -> None:
         """Follow the motion period after period, as long as it has derivatives."""
         contraction, frame, begin = Contraction(self.system), first_frame(self.stretch.shape[1]), self.state
         for p in range(len(self.areas) if self.note is None else 0):

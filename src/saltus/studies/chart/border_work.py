@@ -19,7 +19,7 @@ from saltus.progress import Progress
 from saltus.provenance import check_provenance, identity
 from saltus.studies.chart.border_curves import curve_dataset
 from saltus.studies.chart.changes import Changes, ChartMotions, Ways, ending_type, trace
-from saltus.studies.chart.follow import lost
+from saltus.studies.chart.follow import stability_loss
 from saltus.systems import System
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ MOST_POINTS = 100
 
 
 @dataclass(frozen=True)
-class Workshop:
+class BorderComputations:
     """The system and the numbers of the work on a chart's borders, and who does this work."""
 
     system: System
@@ -151,7 +151,7 @@ def special_point(system: System, paths: Sequence[str], start: Mapping[str, Any]
     here = system.with_(dict(zip(paths, start["place"], strict=True)))
     try:
         orbit = find_orbit(here, **start_at(system, start["state"]), period=int(start["period"]), settle=0)
-        special = lost(follow_stable(orbit, paths[int(start["along"])], float(start["goal"])))
+        special = stability_loss(follow_stable(orbit, paths[int(start["along"])], float(start["goal"])))
     except (MotionError, ParameterError):
         return None
     return special if isinstance(special, SpecialPoint) else None

@@ -20,7 +20,7 @@ from saltus.enumerations import flags
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import answered
 from saltus.studies.chart.border_curves import explained, passes_through
-from saltus.studies.chart.border_work import Workshop
+from saltus.studies.chart.border_work import BorderComputations
 from saltus.studies.chart.cells import beyond_limits, spread
 from saltus.studies.chart.changes import (
     ENDS,
@@ -280,7 +280,7 @@ def with_borders(
     request = ChartRequest.of_chart(system, chart)
     numbers = {"periods": request.periods, "max_period": request.max_period, "tol": request.tol}
     place = None if store is None else Path(store)
-    work = Workshop(system, request.paths, store=place, workers=workers, scheduler=scheduler, **numbers)
+    work = BorderComputations(system, request.paths, store=place, workers=workers, scheduler=scheduler, **numbers)
     search = _BorderSearch(request, work, chart.assign_attrs({ADDED: 0}))
     search.complete(part_of(progress, 0.0, 0.6))
     search.follow_curves(curves, part_of(progress, 0.6, 1.0))
@@ -290,7 +290,7 @@ def with_borders(
 class _BorderSearch:
     """The search for borders: the chart, to which motions are added, and the borders found so far."""
 
-    def __init__(self, request: ChartRequest, work: Workshop, chart: xarray.Dataset) -> None:
+    def __init__(self, request: ChartRequest, work: BorderComputations, chart: xarray.Dataset) -> None:
         self.request, self.work, self.chart, self.borders = request, work, chart, Borders()
         self._begun: set[str] = set()  # the starts of curves that were tried
 

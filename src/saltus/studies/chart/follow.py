@@ -10,7 +10,7 @@ STABILITY_ENDS = ("LP", "PD", "BPC", "GR", "RL", "CH")  # kinds of special point
 AT_THE_END = 1e-6  # a special point within this share of the branch's range from its end is its end
 
 
-def lost(branch: Branch) -> SpecialPoint | str:
+def stability_loss(branch: Branch) -> SpecialPoint | str:
     """The special point at which the orbits of a branch lose their stability, seen from its first point, or why there is none.
 
     It may also be the end of the branch: an orbit that is its own mirror image, a grazing, or the end of a rest.

@@ -42,14 +42,14 @@ class EdgeKind(StrEnum):
 
 
 @dataclass(frozen=True)
-class Tried:
+class TriedValues:
     """What became of motions at all values that were tried, in rising order."""
 
     values: np.ndarray  # (n,)
     verdict: np.ndarray  # (n,): an `Ending`; PERIODIC also where all motions settle or rest
     exponent: np.ndarray  # (n,): largest Lyapunov exponent of the motions that have not settled, else nan
     error: np.ndarray  # (n,): half width of its 95 % interval
-    life: np.ndarray  # (n,): mean life of a transient in forcing periods; of chaos the mean life that is excluded with 95 %
+    mean_life: np.ndarray  # (n,): mean life of a transient in forcing periods; of chaos the mean life that is excluded with 95 %
     period: np.ndarray  # (n,): longest period of the motions that settle, in forcing periods; 0 where none settles
     states: np.ndarray  # (n, k, d): stroboscopic states of the motions that have not settled, else nan
 
@@ -113,7 +113,7 @@ class Bands(Result):
     system: System
     path: str
     bands: tuple[Band, ...]
-    tried: Tried
+    tried: TriedValues
     motions: SimulatedMotions
 
     def to_xarray(self) -> xarray.DataTree:
@@ -141,7 +141,7 @@ class Bands(Result):
             "verdict": ("value", tried.verdict.astype(np.int8), flags(Ending)),
             "life": (
                 "value",
-                tried.life,
+                tried.mean_life,
                 {"long_name": "mean life of transients; of chaos the life that is excluded", "units": "periods"},
             ),
             "period": ("value", tried.period, {"long_name": "longest period of what settles", "units": "forcing periods"}),
@@ -166,7 +166,7 @@ class Bands(Result):
         )
 
 
-def bands_of(tried: Tried) -> tuple[Band, ...]:
+def bands_of(tried: TriedValues) -> tuple[Band, ...]:
     """The runs of successive values with chaos."""
     chaos = np.concatenate([[False], tried.chaotic, [False]]).astype(int)
     first, last = np.flatnonzero(np.diff(chaos) == 1), np.flatnonzero(np.diff(chaos) == -1) - 1
@@ -178,7 +178,7 @@ def bands_of(tried: Tried) -> tuple[Band, ...]:
     return tuple(bands)
 
 
-def _edge(tried: Tried, inner: int, outer: int) -> Edge:
+def _edge(tried: TriedValues, inner: int, outer: int) -> Edge:
     """The edge between the last value with chaos and its neighbour without; the bound of the range if there is no neighbour."""
     value = float(tried.values[inner])
     if not 0 <= outer < len(tried.values):

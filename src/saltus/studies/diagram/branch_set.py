@@ -263,7 +263,7 @@ class BranchSet:
     compared: dict[int, int] = field(default_factory=dict)  # with how many branches each partial branch was compared
     left: int = 0  # special points at which a family is born that is not followed
 
-    def follow(self, orbit: PeriodicOrbit, while_stable: bool = False, progress: Progress = silent) -> None:
+    def add_branches_of(self, orbit: PeriodicOrbit, while_stable: bool = False, progress: Progress = silent) -> None:
         """Follow an orbit unless it lies on a known branch: either only while it is stable, or all the way, and then also the
         parents' branches at whose special points its branch ends."""
         if while_stable and not self.knows(orbit):
@@ -312,7 +312,7 @@ class BranchSet:
         return key in self.parts
 
     def _continued(self, orbit: PeriodicOrbit, progress: Progress, while_stable: bool = False) -> Branch:
-        return self.work.follow([self.request(orbit, while_stable)], progress)[0][0]
+        return self.work.branches_of([self.request(orbit, while_stable)], progress)[0][0]
 
     def request(self, start: PeriodicOrbit | SpecialPoint, while_stable: bool = False) -> Request:
         """The request for the branch of an orbit, or for the branches that are born at a special point."""
@@ -361,7 +361,7 @@ class BranchSet:
 
     def _born_at(self, special: SpecialPoint, progress: Progress) -> list[Branch]:
         """The branches that begin at a special point, without those that are known already."""
-        born = self.work.follow([self.request(special)], progress)[0]
+        born = self.work.branches_of([self.request(special)], progress)[0]
         return [branch for branch in born if not self.knows(branch.points[len(branch.points) // 2].orbit)]
 
     def _is_followed(self, special: SpecialPoint) -> bool:

@@ -17,7 +17,7 @@ from saltus.public_functions import checked_by
 from saltus.studies.diagram.bands import BandOrigin, Bands
 from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.effort import EFFORTS, check_diagram, read_effort
-from saltus.studies.diagram.searched_range import Begun, Question, SearchedRange, SearchedValue
+from saltus.studies.diagram.searched_range import JudgementRequest, MotionStarts, SearchedRange, SearchedValue
 from saltus.studies.diagram.simulated import SimulatedMotions, starts_at
 from saltus.systems import System
 from saltus.window import Box, check_window
@@ -143,7 +143,9 @@ class BandSearch(SearchedRange):
         chosen = [origin for origin in fresh if self._is_apart(origin.value)]
         outside = [origin for origin in chosen if not self._is_within_chaos(origin.value)]
         values = [(origin.value + share * self.span, origin.state) for origin in outside for share in self.settings.beside]
-        self.follow(Begun(value, np.array([state])) for value, state in values if self.bounds[0] <= value <= self.bounds[1])
+        self.simulate_starts(
+            MotionStarts(value, np.array([state])) for value, state in values if self.bounds[0] <= value <= self.bounds[1]
+        )
 
     def _is_apart(self, value: float) -> bool:
         """Whether no special point nearby was chosen before; then this one is."""
@@ -164,8 +166,8 @@ class BandSearch(SearchedRange):
 
     def _is_within_chaos(self, value: float) -> bool:
         """Whether there is chaos at both of the tried values next to this one."""
-        at = bisect_left(self.places, SearchedValue(value))
-        return 0 < at < len(self.places) and all(place.chaotic for place in self.places[at - 1 : at + 1])
+        at = bisect_left(self.entries, SearchedValue(value))
+        return 0 < at < len(self.entries) and all(entry.chaotic for entry in self.entries[at - 1 : at + 1])
 
     def refine(self, progress: Progress = silent, inside: bool = False) -> None:
         """Halve intervals and carry chaos to neighbouring values, until neither shows anything new; or, if asked, only halve
@@ -174,24 +176,24 @@ class BandSearch(SearchedRange):
         All motions of a round are simulated together, as a few motions take nearly as long as many.
         """
         for number in itertools.count():
-            progress(1.0 - SLOWER**number, f"looking for chaos, values: {len(self.places)}")
-            pairs = ((a, b) for a, b in itertools.pairwise(self.places) if not inside or (a.chaotic and b.chaotic))
+            progress(1.0 - SLOWER**number, f"looking for chaos, values: {len(self.entries)}")
+            pairs = ((a, b) for a, b in itertools.pairwise(self.entries) if not inside or (a.chaotic and b.chaotic))
             middles = [(a, b) for a, b in pairs if self._is_of_interest(a, b)]
             carried = [] if inside else self._to_carry()
             if not middles and not carried:
                 return
-            begun = [Begun(b.value, a.starts(self.settings.seeds, 0)) for a, b in carried]
-            self.follow(begun + [self._begin_between(a, b) for a, b in middles])
+            begun = [MotionStarts(b.value, a.starts(self.settings.seeds, 0)) for a, b in carried]
+            self.simulate_starts(begun + [self._begin_between(a, b) for a, b in middles])
 
     def _to_carry(self) -> list[tuple[SearchedValue, SearchedValue]]:
         """Pairs of neighbouring values of which only the first one `goes_on`: its motions are to be continued at the second one.
 
         Where there is chaos at the outermost value, the end of the range becomes a value, too.
         """
-        for bound, outermost in zip(self.bounds, (self.places[:1], self.places[-1:]), strict=True):
-            if any(place.chaotic for place in outermost):
-                self.place(bound)
-        marked = [(place, place.goes_on) for place in self.places]
+        for bound, outermost in zip(self.bounds, (self.entries[:1], self.entries[-1:]), strict=True):
+            if any(entry.chaotic for entry in outermost):
+                self.entry(bound)
+        marked = [(entry, entry.goes_on) for entry in self.entries]
         pairs = [(a, b) if on else (b, a) for (a, on), (b, other) in itertools.pairwise(marked) if on != other]
         fresh = [(a, b) for a, b in pairs if (a.value, b.value) not in self.carried]
         self.carried.update((a.value, b.value) for a, b in fresh)
@@ -211,30 +213,30 @@ class BandSearch(SearchedRange):
         special = inside < len(self.special) and self.special[inside].value <= b.value
         return special or a.kinds != b.kinds or bool(len(a.chaos) + len(b.chaos))
 
-    def _begin_between(self, a: SearchedValue, b: SearchedValue) -> Begun:
+    def _begin_between(self, a: SearchedValue, b: SearchedValue) -> MotionStarts:
         """The motions that begin in the middle of an interval, from the states of the motions at both ends.
 
         If all motions at both ends come to rest there are no such states; the middle then counts as tried all the same.
         """
         few, middle = (self.settings.seeds, self.settings.neighbours), 0.5 * (a.value + b.value)
         some = [states for states in (a.starts(*few), b.starts(*few)) if len(states)]
-        self.place(middle)
+        self.entry(middle)
         self.carried.update(((a.value, middle), (b.value, middle)))
-        return Begun(middle, np.concatenate(some) if some else np.empty((0, 0)), self._care_between(a, b))
+        return MotionStarts(middle, np.concatenate(some) if some else np.empty((0, 0)), self._level_between(a, b))
 
-    def _care_between(self, a: SearchedValue, b: SearchedValue) -> int:
+    def _level_between(self, a: SearchedValue, b: SearchedValue) -> int:
         """The care with which chaos between two values is judged: if there is an edge between them, the one that it needs."""
-        return self._care_against(b if a.chaotic else a) if a.chaotic != b.chaotic else 0
+        return self._level_against(b if a.chaotic else a) if a.chaotic != b.chaotic else 0
 
-    def _care_against(self, other: SearchedValue) -> int:
+    def _level_against(self, other: SearchedValue) -> int:
         """The care with which chaos next to a value without chaos is judged.
 
         If the motions without chaos are transients, it is the least care that excludes mean lives `longer` times as long as
         theirs.
         """
-        life = self.settings.longer * other.life if other.verdict is Ending.TRANSIENT else 0.0
+        life = self.settings.longer * other.mean_life if other.verdict is Ending.TRANSIENT else 0.0
         judgements = self.settings.judgements
-        return next((care for care, one in enumerate(judgements) if one.exposure >= 3.0 * life), len(judgements) - 1)
+        return next((level for level, one in enumerate(judgements) if one.exposure >= 3.0 * life), len(judgements) - 1)
 
     def confirm(self, progress: Progress = silent) -> None:
         """Judge doubtful chaos with more care; where it turns out to be a transient, find the new edges of the band."""
@@ -252,58 +254,60 @@ class BandSearch(SearchedRange):
         Settling is a Poisson process, so the forcing periods in which no companion settles add up over neighbouring values. If in
         a stretch of a band they are fewer than the second judgement asks for, the value in the middle is judged again. The same
         holds for narrow parts of a band in which some motions settle: these may be windows with long transients. The last value
-        with chaos at an edge is judged with the care that `_care_against` gives, and a value at which some companions have
+        with chaos at an edge is judged with the care that `_level_against` gives, and a value at which some companions have
         settled with the next higher care.
         """
         runs, doubtful = self._runs(), dict[int, list[SearchedValue]]()
         enough = self.settings.judgements[min(1, len(self.settings.judgements) - 1)].exposure
         for part in [part for run in runs for part in (*self._stretches(run), *self._beside_windows(run))]:
-            if sum(place.quiet for place in part) < enough:
+            if sum(entry.periods_without_settling for entry in part) < enough:
                 doubtful.setdefault(1, []).append(part[len(part) // 2])
         for a, b in self._edges():
-            doubtful.setdefault(self._care_against(b), []).append(a)
-        for place in (place for run in runs for place in run if place.settled):
-            doubtful.setdefault(place.care + 1, []).append(place)
+            doubtful.setdefault(self._level_against(b), []).append(a)
+        for entry in (entry for run in runs for entry in run if entry.settled_count):
+            doubtful.setdefault(entry.judgement_level + 1, []).append(entry)
         return doubtful
 
     def _confirm_near(self, failed: list[SearchedValue]) -> None:
         """Judge the nearest chaos beside values that turned out to have none; where this chaos fails too, go on outwards."""
-        for care in {place.care for place in failed}:
-            beside, reach = [place.value for place in failed if place.care == care], self.settings.near
+        for level in {entry.judgement_level for entry in failed}:
+            beside, reach = [entry.value for entry in failed if entry.judgement_level == level], self.settings.near
             while beside:
-                chaotic = [place for place in self.places if place.chaotic]
+                chaotic = [entry for entry in self.entries if entry.chaotic]
                 at = [bisect_left(chaotic, SearchedValue(value)) for value in beside]
-                near = {place.value: place for i in at for place in chaotic[max(0, i - reach) : i + reach]}
-                beside, reach = [place.value for place in self._confirm({care: list(near.values())})], 2 * reach
+                near = {entry.value: entry for i in at for entry in chaotic[max(0, i - reach) : i + reach]}
+                beside, reach = [entry.value for entry in self._confirm({level: list(near.values())})], 2 * reach
 
     def _edges(self) -> list[tuple[SearchedValue, SearchedValue]]:
         """Neighbours of which the first is chaotic and the second is not."""
-        pairs = [pair for a, b in itertools.pairwise(self.places) for pair in ((a, b), (b, a))]
+        pairs = [pair for a, b in itertools.pairwise(self.entries) for pair in ((a, b), (b, a))]
         return [(a, b) for a, b in pairs if a.chaotic and not b.chaotic]
 
     def _confirm(self, doubtful: Mapping[int, Sequence[SearchedValue]]) -> list[SearchedValue]:
-        """Judge chaos with these cares where that has not been done; returns the values at which there is none after all."""
+        """Judge chaos with these levels where that has not been done; returns the values at which there is none after all."""
         wanted: dict[float, tuple[int, SearchedValue]] = {}
-        for care in sorted(doubtful):  # of several cares the highest counts
-            wanted |= {place.value: (min(care, len(self.settings.judgements) - 1), place) for place in doubtful[care]}
+        for level in sorted(doubtful):  # of several levels the highest counts
+            wanted |= {entry.value: (min(level, len(self.settings.judgements) - 1), entry) for entry in doubtful[level]}
         asked: dict[tuple[int, int], list[SearchedValue]] = {}
-        for care, place in wanted.values():
-            if place.chaotic and place.care < care:
-                asked.setdefault((care, len(place.chaos)), []).append(place)
+        for level, entry in wanted.values():
+            if entry.chaotic and entry.judgement_level < level:
+                asked.setdefault((level, len(entry.chaos)), []).append(entry)
         questions = []
-        for (care, _), alike in asked.items():
-            known = EarlierJudgement(*np.array([(place.exponent, place.error, place.quiet) for place in alike]).T)
-            states = np.stack([place.chaos for place in alike])
-            questions.append(Question(np.array([place.value for place in alike]), states, care, known))
+        for (level, _), alike in asked.items():
+            known = EarlierJudgement(
+                *np.array([(entry.exponent, entry.error, entry.periods_without_settling) for entry in alike]).T
+            )
+            states = np.stack([entry.chaos for entry in alike])
+            questions.append(JudgementRequest(np.array([entry.value for entry in alike]), states, level, known))
         self._judge(questions)
-        return [place for alike in asked.values() for place in alike if not place.chaotic]
+        return [entry for alike in asked.values() for entry in alike if not entry.chaotic]
 
     def _runs(self) -> list[list[SearchedValue]]:
         """The runs of successive values with chaos."""
         runs: list[list[SearchedValue]] = [[]]
-        for place in self.places:
-            if place.chaotic:
-                runs[-1].append(place)
+        for entry in self.entries:
+            if entry.chaotic:
+                runs[-1].append(entry)
             elif runs[-1]:
                 runs.append([])
         return [run for run in runs if run]
@@ -316,7 +320,7 @@ class BandSearch(SearchedRange):
     def _beside_windows(self, run: list[SearchedValue]) -> list[list[SearchedValue]]:
         """The narrow parts of a band in which some motions settle, a part for each period and number of impacts."""
         extents: dict[tuple[int, int], list[SearchedValue]] = {}
-        for place in run:
-            for kind in place.kinds:
-                extents.setdefault(kind, []).append(place)
+        for entry in run:
+            for kind in entry.kinds:
+                extents.setdefault(kind, []).append(entry)
         return [some for some in extents.values() if some[-1].value - some[0].value <= self.settings.every * self.span]

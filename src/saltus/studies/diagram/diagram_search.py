@@ -19,7 +19,7 @@ from saltus.studies.diagram.chaos_search import BandSearch
 from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.effort import EffortSettings
 from saltus.studies.diagram.side_by_side import side_by_side
-from saltus.studies.diagram.simulated import LONG, AttractorsFound, Place, SimulatedMotions, starts_at
+from saltus.studies.diagram.simulated import LONG, AttractorsFound, BranchAssignment, SimulatedMotions, starts_at
 from saltus.studies.diagram.simulated import SETTINGS as SIMULATION
 from saltus.systems import System
 from saltus.window import Window
@@ -112,7 +112,7 @@ class DiagramSearch:
         """Whether the mirror image of a motion is a motion too."""
         return keeps_symmetry(self.system, self.path)
 
-    def follow(self, progress: Progress) -> None:
+    def follow_motions(self, progress: Progress) -> None:
         """Follow the attractors that were simulated and lie on no branch, until none is left that was not tried."""
         while True:
             self._place()
@@ -125,22 +125,22 @@ class DiagramSearch:
                 if not self._is_placed(row, self.branches.placed[self.found.looked[row] :]):
                     narrow = self._is_partial(run)
                     if narrow and len(self.branches.partial) >= self.effort.narrow:
-                        self.found.place[run] = Place.LEFT
+                        self.found.assignment[run] = BranchAssignment.LEFT
                         continue
                     self._prepare(runs[number:])
                     known = len(self.branches.placed)
                     share = known / (known + len(rows))
                     watch = part_of(progress, share, share, f"following, branches: {known}")
-                    self.found.place[row] = self._follow(row, narrow, watch)
+                    self.found.assignment[row] = self._follow(row, narrow, watch)
 
     def _place(self) -> None:
         """Compare the attractors that lie on no branch so far with the branches that are new to them."""
         rows, count = self.found.unplaced, len(self.branches.placed)
-        rows = rows[(self.found.place[rows] != Place.LONGER) & (self.found.looked[rows] < count)]
+        rows = rows[(self.found.assignment[rows] != BranchAssignment.LONGER) & (self.found.looked[rows] < count)]
         for first in np.unique(self.found.looked[rows]).tolist():
             some = rows[self.found.looked[rows] == first]
             there = placed(self.found.motions.only(some), self.branches.placed[first:], self.mirrored)
-            self.found.place[some[there]] = Place.ON_BRANCH
+            self.found.assignment[some[there]] = BranchAssignment.ON_BRANCH
         self.found.looked[rows] = count
 
     def _is_placed(self, row: int, branches: list[PlacedBranch]) -> bool:
@@ -181,16 +181,16 @@ class DiagramSearch:
         system = self.system.with_({self.path: float(motions.value[row])})
         return solved_near(system, self.path, motions.last[row], int(motions.period[row]))
 
-    def _follow(self, row: int, while_stable: bool, progress: Progress) -> Place:
+    def _follow(self, row: int, while_stable: bool, progress: Progress) -> BranchAssignment:
         """Follow a simulated motion; returns where it then stands."""
         orbit = self._orbit(row)
         if orbit is None:
-            return Place.NO_ORBIT
+            return BranchAssignment.NO_ORBIT
         known = len(self.branches.placed)
-        self.branches.follow(orbit, while_stable and orbit.stable, progress)
+        self.branches.add_branches_of(orbit, while_stable and orbit.stable, progress)
         if self._is_placed(row, self.branches.placed[known:]) or (orbit.stable and self.branches.knows(orbit)):
-            return Place.ON_BRANCH
-        return Place.ELSEWHERE if orbit.stable else Place.UNSTABLE
+            return BranchAssignment.ON_BRANCH
+        return BranchAssignment.ELSEWHERE if orbit.stable else BranchAssignment.UNSTABLE
 
     def repel(self, max_period: int, progress: Progress) -> None:
         """Follow repelling orbits to which motions come near and near which they return, at some values of the grid.
@@ -213,7 +213,7 @@ class DiagramSearch:
         most = len(self.branches.placed) + self.effort.branches
         for orbit in sorted(orbits, key=lambda orbit: orbit.period):
             if len(self.branches.placed) < most:
-                self.branches.follow(orbit, progress=watch)
+                self.branches.add_branches_of(orbit, progress=watch)
             else:
                 self.branches.left += 1
 
@@ -229,7 +229,7 @@ class DiagramSearch:
             values, states = np.concatenate([values, more_values]), np.concatenate([states, more_states])
             if not len(values) or not self.found.add(self.simulated(values, states, watch)):
                 return
-            self.follow(progress)
+            self.follow_motions(progress)
 
     def _beyond_ends(self, branches: list[PlacedBranch]) -> tuple[np.ndarray, np.ndarray]:
         """Values and states of starts beyond the ends of stable parts of branches."""
@@ -251,7 +251,7 @@ class DiagramSearch:
             self.band_search = BandSearch(self.work, self.bounds, self.effort.chaos)
             self._look_for_chaos(self.found.motions, progress, more)
         else:
-            self.follow(progress)
+            self.follow_motions(progress)
             more(progress)
 
     def _look_for_chaos(
@@ -314,7 +314,7 @@ class DiagramSearch:
             self._beside(self.follow, partial(self._draw, number), progress)
             self.found.add(self.drawn)
             self._place()
-            unknown = self.found.place[self.found.attractor[first:]] != Place.ON_BRANCH
+            unknown = self.found.assignment[self.found.attractor[first:]] != BranchAssignment.ON_BRANCH
             loose = self.drawn.unsettled & ~self._in_bands(self.drawn.value)
             missed = (self.drawn.periodic & unknown) | loose
             self.missed = MissedShare(int(missed.sum()), len(missed), number + 1, int(self.drawn.ended.sum()))
@@ -323,7 +323,7 @@ class DiagramSearch:
             self.found.reopen(np.arange(first, len(self.found.motions)))
             if self.band_search is not None and self.effort.samples > 1:
                 self._look_for_chaos(self.drawn.only(loose), progress)
-        self.follow(progress)
+        self.follow_motions(progress)
 
     def _draw(self, number: int, progress: Progress) -> None:
         """Draw a sample: motions from random states of the window at random values; each sample has its own seed."""

@@ -22,7 +22,7 @@ from saltus.studies.diagram.branch_set import BranchSet
 from saltus.studies.diagram.diagram_search import DiagramSearch
 from saltus.studies.diagram.diagram_work import DiagramWork, diagram_plan, diagram_work
 from saltus.studies.diagram.effort import EFFORTS, check_diagram, read_effort
-from saltus.studies.diagram.simulated import LONG, Place
+from saltus.studies.diagram.simulated import LONG, BranchAssignment
 from saltus.systems import System
 from saltus.theory import amplitude_limits
 from saltus.window import Box, check_window
@@ -134,11 +134,11 @@ def _attractors(search: DiagramSearch) -> xarray.Dataset:
     """The attractors on which motions settled at the values of the grid, a dot each, without those of long periods that are not
     followed."""
     found = search.found
-    left = np.isin(found.place[found.rows], (Place.LONGER, Place.RARE))
+    left = np.isin(found.assignment[found.rows], (BranchAssignment.LONGER, BranchAssignment.RARE))
     shown = np.isin(found.motions.value[found.rows], search.grid) & ~left
     data = _dots(search, found.rows[shown])
     data["starts"] = ("dot", found.starts[shown], {"long_name": "motions of the simulation that have settled on it"})
-    data["placed"] = ("dot", (found.place[found.rows[shown]] == Place.ON_BRANCH).astype(np.int8))
+    data["placed"] = ("dot", (found.assignment[found.rows[shown]] == BranchAssignment.ON_BRANCH).astype(np.int8))
     data["placed"].attrs["long_name"] = "whether it lies on a stable part of a branch"
     return data
 
@@ -146,9 +146,9 @@ def _attractors(search: DiagramSearch) -> xarray.Dataset:
 def _unplaced(search: DiagramSearch) -> xarray.Dataset:
     """The attractors that lie on no branch, at all values, with the reason."""
     rows = search.found.unplaced
-    data, places = _dots(search, rows), search.found.place[rows]
-    data["reason"] = ("dot", np.array([Place(place).name.lower() for place in places], dtype="U16"))
-    data["reason"].attrs = {place.name.lower(): str(place) for place in Place}
+    data, places = _dots(search, rows), search.found.assignment[rows]
+    data["reason"] = ("dot", np.array([BranchAssignment(place).name.lower() for place in places], dtype="U16"))
+    data["reason"].attrs = {place.name.lower(): str(place) for place in BranchAssignment}
     return data
 
 

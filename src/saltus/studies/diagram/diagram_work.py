@@ -140,7 +140,7 @@ class DiagramWork:
             return [self.judge(*question) for question in questions]
         return all_at_once([partial(self._judge, *question) for question in questions])
 
-    def follow(self, requests: Sequence[Request], progress: Progress = silent) -> list[list[Branch]]:
+    def branches_of(self, requests: Sequence[Request], progress: Progress = silent) -> list[list[Branch]]:
         """The branches of each request; those that the store lacks are computed at the same time."""
         if self.memo is None:
             return [request.branches(self.path, progress) for request in requests]

@@ -13,7 +13,7 @@ import numpy as np
 
 from saltus.attractors import EarlierJudgement, Judged
 from saltus.flow import Ending
-from saltus.studies.diagram.bands import Bands, Tried, bands_of
+from saltus.studies.diagram.bands import Bands, TriedValues, bands_of
 from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.effort import CHAOS, ChaosSettings
 from saltus.studies.diagram.simulated import SimulatedMotions
@@ -30,10 +30,10 @@ class SearchedValue:
     verdict: Ending = field(default=Ending.PERIODIC, compare=False)  # until a motion is judged, all are taken to settle
     exponent: float = field(default=np.nan, compare=False)
     error: float = field(default=np.nan, compare=False)
-    life: float = field(default=np.nan, compare=False)
+    mean_life: float = field(default=np.nan, compare=False)
     period: int = field(default=0, compare=False)  # of a motion that settles slowly, or on an orbit of a long period
-    care: int = field(default=0, compare=False)  # number of the judgement that gave the verdict
-    settled: int = field(default=0, compare=False)  # companions that settled in that judgement
+    judgement_level: int = field(default=0, compare=False)  # number of the judgement that gave the verdict
+    settled_count: int = field(default=0, compare=False)  # companions that settled in that judgement
     chaos: np.ndarray = field(default_factory=lambda: np.empty((0, 0)), compare=False)  # (n, d): states of unsettled motions
     # Period, number of impacts, amplitude and state at phase 0 of each motion that has settled.
     orbits: list[tuple[int, int, float, np.ndarray]] = field(default_factory=list, compare=False)
@@ -45,9 +45,9 @@ class SearchedValue:
         return self.verdict is Ending.CHAOTIC
 
     @property
-    def quiet(self) -> float:
-        """Forcing periods of companions, in all, if none of these has settled, else 0; see `Judged.life`."""
-        return 0.0 if self.settled else 3.0 * self.life
+    def periods_without_settling(self) -> float:
+        """Forcing periods of companions, in all, if none of these has settled, else 0; see `Judged.mean_life`."""
+        return 0.0 if self.settled_count else 3.0 * self.mean_life
 
     @property
     def kinds(self) -> set[tuple[int, int]]:
@@ -66,16 +66,16 @@ class SearchedValue:
         """The longest period of the motions that settle, in forcing periods."""
         return max(self.period, self.longest_orbit)
 
-    def judge(self, judged: Judged, row: int, care: int) -> None:
+    def judge(self, judged: Judged, row: int, level: int) -> None:
         """Take the verdict on the unsettled motions here, unless an earlier judgement was more careful, or as careful and found a
         verdict of higher rank."""
         verdict = Ending(judged.ending[row])
-        if care < self.care or (care == self.care and RANKS.index(verdict) < RANKS.index(self.verdict)):
+        if level < self.judgement_level or (level == self.judgement_level and RANKS.index(verdict) < RANKS.index(self.verdict)):
             return
-        self.verdict, self.care, self.chaos = verdict, care, judged.states[row]
+        self.verdict, self.judgement_level, self.chaos = verdict, level, judged.states[row]
         self.exponent, self.error = float(judged.exponent[row]), float(judged.error[row])
-        self.life, self.period = float(judged.life[row]), int(judged.period[row])
-        self.settled = int(judged.gone[row])
+        self.mean_life, self.period = float(judged.mean_life[row]), int(judged.period[row])
+        self.settled_count = int(judged.settled_count[row])
 
     def settle(self, period: int, impacts: int, amplitude: float, state: np.ndarray) -> None:
         """Add a motion that has settled here, unless it is known."""
@@ -93,20 +93,20 @@ class SearchedValue:
         return np.concatenate([*([chosen] if len(chosen) or not settled else []), *settled])
 
 
-class Begun(NamedTuple):
+class MotionStarts(NamedTuple):
     """Motions that begin at one value, from states (n, d), and the care with which they are judged if they do not settle."""
 
     value: float
     states: np.ndarray
-    care: int = 0
+    level: int = 0
 
 
-class Question(NamedTuple):
+class JudgementRequest(NamedTuple):
     """States (n, m, d) of motions that have not settled at values (n,), to be judged with the same care."""
 
     values: np.ndarray
     states: np.ndarray
-    care: int
+    level: int
     earlier: EarlierJudgement | None = None
 
 
@@ -117,7 +117,7 @@ class SearchedRange:
     work: DiagramWork
     bounds: tuple[float, float]
     settings: ChaosSettings = CHAOS
-    places: list[SearchedValue] = field(default_factory=list)  # by value
+    entries: list[SearchedValue] = field(default_factory=list)  # by value
     given: list[SimulatedMotions] = field(default_factory=list)  # motions that were simulated before, in the order of the calls
     begun: list[SimulatedMotions] = field(default_factory=list)  # motions that the search has begun itself
 
@@ -132,30 +132,30 @@ class SearchedRange:
         """The width of the range."""
         return self.bounds[1] - self.bounds[0]
 
-    def place(self, value: float) -> SearchedValue:
+    def entry(self, value: float) -> SearchedValue:
         """The entry of a value, a new one if the value was not tried before."""
-        at = bisect_left(self.places, SearchedValue(value))
-        if at == len(self.places) or self.places[at].value != value:
-            insort(self.places, SearchedValue(value, chaos=np.empty((0, self.work.system.dimension))))
-        return self.places[at]
+        at = bisect_left(self.entries, SearchedValue(value))
+        if at == len(self.entries) or self.entries[at].value != value:
+            insort(self.entries, SearchedValue(value, chaos=np.empty((0, self.work.system.dimension))))
+        return self.entries[at]
 
-    def follow(self, begun: Iterable[Begun]) -> None:
+    def simulate_starts(self, begun: Iterable[MotionStarts]) -> None:
         """Follow motions from states at some values, and judge those that do not settle."""
         some = [one for one in begun if len(one.states)]
         if some:
             column = np.repeat([one.value for one in some], [len(one.states) for one in some])
             motions = self._simulate(column, np.concatenate([one.states for one in some]))
-            self.take(motions, {one.value: one.care for one in some})
+            self.take(motions, {one.value: one.level for one in some})
 
     def _simulate(self, values: np.ndarray, states: np.ndarray) -> SimulatedMotions:
         self.begun.append(self.work.simulate(values, states, self.settings.settling))
         return self.begun[-1]
 
-    def take(self, motions: SimulatedMotions, care: Mapping[float, int] = MappingProxyType({})) -> None:
+    def take(self, motions: SimulatedMotions, level: Mapping[float, int] = MappingProxyType({})) -> None:
         """Add motions to what is known, and judge those that have not settled, with more care at some values."""
         self._settle(motions)
         for value in np.unique(motions.value):
-            self.place(float(value))
+            self.entry(float(value))
         loose = motions.only(motions.unsettled)
         values, row = np.unique(loose.value, return_inverse=True)
         if not values.size:
@@ -164,21 +164,23 @@ class SearchedRange:
         states = np.full((len(values), most, *last.shape[1:]), np.nan)
         for i in range(len(values)):
             states[i, : np.count_nonzero(row == i)] = last[row == i]
-        states, cares = states.reshape(len(values), -1, states.shape[-1]), np.array([care.get(value, 0) for value in values])
-        self._judge([Question(values[cares == one], states[cares == one], one) for one in np.unique(cares).tolist()])
+        states, levels = states.reshape(len(values), -1, states.shape[-1]), np.array([level.get(value, 0) for value in values])
+        self._judge([JudgementRequest(values[levels == one], states[levels == one], one) for one in np.unique(levels).tolist()])
 
-    def _judge(self, questions: Sequence[Question]) -> None:
+    def _judge(self, questions: Sequence[JudgementRequest]) -> None:
         """Judge motions that have not settled.
 
         Motions on which companions have settled are then simulated too, and added to what is known.
         """
-        answers = self.work.judge_all([(q.values, q.states, self.settings.judgements[q.care], q.earlier) for q in questions])
-        later: list[Begun] = []
+        answers = self.work.judge_all([(q.values, q.states, self.settings.judgements[q.level], q.earlier) for q in questions])
+        later: list[MotionStarts] = []
         for question, judged in zip(questions, answers, strict=True):
             for row, value in enumerate(question.values):
-                self.place(float(value)).judge(judged, row, question.care)
+                self.entry(float(value)).judge(judged, row, question.level)
             found = judged.settled.few(self.settings.neighbours // 2, len(judged.settled.period))
-            later += [Begun(question.values[row], state[None]) for row, state in zip(found.question, found.state, strict=True)]
+            later += [
+                MotionStarts(question.values[row], state[None]) for row, state in zip(found.question, found.state, strict=True)
+            ]
         if later:
             states = np.concatenate([one.states for one in later])
             self._settle(self._simulate(np.array([one.value for one in later]), states))
@@ -188,20 +190,20 @@ class SearchedRange:
         for i in np.flatnonzero(motions.periodic):
             impacts = 0 if 0.0 < motions.slowest[i] < self.settings.dying else int(motions.impact_count[i])
             facts = int(motions.period[i]), impacts, float(motions.amplitude[i])
-            self.place(float(motions.value[i])).settle(*facts, motions.last[i])
+            self.entry(float(motions.value[i])).settle(*facts, motions.last[i])
 
-    def tried(self) -> Tried:
+    def tried(self) -> TriedValues:
         """What became of motions at all values."""
         most = max(judgement.companions for judgement in self.settings.judgements)
-        states = np.full((len(self.places), most, self.work.system.dimension), np.nan)
-        for row, place in enumerate(self.places):
-            states[row, : len(place.chaos)] = place.chaos
-        return Tried(
-            values=np.array([place.value for place in self.places]),
-            verdict=np.array([place.verdict for place in self.places]),
-            exponent=np.array([place.exponent for place in self.places]),
-            error=np.array([place.error for place in self.places]),
-            life=np.array([place.life for place in self.places]),
-            period=np.array([place.longest for place in self.places]),
+        states = np.full((len(self.entries), most, self.work.system.dimension), np.nan)
+        for row, entry in enumerate(self.entries):
+            states[row, : len(entry.chaos)] = entry.chaos
+        return TriedValues(
+            values=np.array([entry.value for entry in self.entries]),
+            verdict=np.array([entry.verdict for entry in self.entries]),
+            exponent=np.array([entry.exponent for entry in self.entries]),
+            error=np.array([entry.error for entry in self.entries]),
+            mean_life=np.array([entry.mean_life for entry in self.entries]),
+            period=np.array([entry.longest for entry in self.entries]),
             states=states,
         )

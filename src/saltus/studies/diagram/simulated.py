@@ -198,7 +198,7 @@ def _is_slow(motions: SimulatedMotions) -> np.ndarray:
     return np.asarray(_return_distance(motions) <= SETTINGS.slow * np.maximum(motions.amplitude, SETTINGS.still))
 
 
-class Place(NumberedSentence):
+class BranchAssignment(NumberedSentence):
     """Whether a simulated periodic motion lies on a branch, or why not; its `str` is the sentence."""
 
     OPEN = 0, "it has not been looked at"
@@ -220,21 +220,21 @@ class AttractorsFound:
 
     motions: SimulatedMotions
     max_period: int  # the longest period of orbits that are followed
-    place: np.ndarray = field(init=False)  # (n,): a `Place` for each motion, kept up to date for `rows` only
+    assignment: np.ndarray = field(init=False)  # (n,): a `BranchAssignment` for each motion, kept up to date for `rows` only
     looked: np.ndarray = field(init=False)  # (n,): a motion was compared with so many branches, the first ones
     rows: np.ndarray = field(init=False)  # the first motion that was found on each attractor, by value
     starts: np.ndarray = field(init=False)  # how many motions were found on the attractor of each of these rows
     attractor: np.ndarray = field(init=False)  # (n,): the row of the attractor of each motion; its own where it has not settled
 
     def __post_init__(self) -> None:
-        self.place, self.looked = np.zeros(len(self.motions), dtype=np.int8), np.zeros(len(self.motions), dtype=int)
+        self.assignment, self.looked = np.zeros(len(self.motions), dtype=np.int8), np.zeros(len(self.motions), dtype=int)
         self._tell_apart()
 
     def add(self, more: SimulatedMotions) -> int:
         """Add motions; returns how many attractors are new."""
         before = len(self.rows)
         self.motions = self.motions.joined(more)
-        self.place = np.append(self.place, np.zeros(len(more), dtype=np.int8))
+        self.assignment = np.append(self.assignment, np.zeros(len(more), dtype=np.int8))
         self.looked = np.append(self.looked, np.zeros(len(more), dtype=int))
         self._tell_apart()
         return len(self.rows) - before
@@ -255,23 +255,23 @@ class AttractorsFound:
         self.attractor = np.arange(len(self.motions))
         self.attractor[rows] = np.repeat(self.rows, self.starts)
         period = self.motions.period[self.rows]
-        self.place[self.rows[period > self.max_period]] = Place.LONGER
-        self.place[np.intersect1d(self.open, self.rows[period > LONG])] = Place.RARE
+        self.assignment[self.rows[period > self.max_period]] = BranchAssignment.LONGER
+        self.assignment[np.intersect1d(self.open, self.rows[period > LONG])] = BranchAssignment.RARE
 
     @property
     def open(self) -> np.ndarray:
         """The rows of attractors of which it is not known yet whether they lie on a branch."""
-        return np.asarray(self.rows[self.place[self.rows] == Place.OPEN])
+        return np.asarray(self.rows[self.assignment[self.rows] == BranchAssignment.OPEN])
 
     def reopen(self, motions: np.ndarray) -> None:
         """Let attractors be followed that were taken as rare, as the random motions of these rows end on them."""
         ends = self.attractor[motions]
-        self.place[ends[self.place[ends] == Place.RARE]] = Place.OPEN
+        self.assignment[ends[self.assignment[ends] == BranchAssignment.RARE]] = BranchAssignment.OPEN
 
     @property
     def unplaced(self) -> np.ndarray:
         """The rows of attractors that lie on no branch."""
-        return np.asarray(self.rows[self.place[self.rows] != Place.ON_BRANCH])
+        return np.asarray(self.rows[self.assignment[self.rows] != BranchAssignment.ON_BRANCH])
 
     def families(self, rows: np.ndarray) -> list[np.ndarray]:
         """The attractors of these rows in runs along the parameter, each of similar motions; long runs first."""
