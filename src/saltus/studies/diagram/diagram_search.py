@@ -265,7 +265,7 @@ class DiagramSearch:
         assert self.band_search is not None
         search, known = self.band_search, len(self.found.motions)
         begin = partial(search.begin, _without_repetition(motions))
-        self._beside(self.follow, begin, part_of(progress, 0.0, 0.3))
+        self._beside(self.follow_motions, begin, part_of(progress, 0.0, 0.3))
         if more is not None:
             look = partial(search.beside_special_points, band_origins(self.branches.branches))
             self._beside(more, look, part_of(progress, 0.3, 0.4))
@@ -273,7 +273,7 @@ class DiagramSearch:
         self._take_begun()
         search.locate(later, band_origins(self.branches.branches), part_of(progress, 0.4, 0.7))
         self._take_begun()
-        self._beside(self.follow, search.confirm, part_of(progress, 0.7, 1.0))
+        self._beside(self.follow_motions, search.confirm, part_of(progress, 0.7, 1.0))
         self._take_begun()
 
     def _follow_more(self, repelling: int, progress: Progress) -> None:
@@ -311,7 +311,7 @@ class DiagramSearch:
         """
         for number in range(self.effort.samples):
             first = len(self.found.motions)
-            self._beside(self.follow, partial(self._draw, number), progress)
+            self._beside(self.follow_motions, partial(self._draw, number), progress)
             self.found.add(self.drawn)
             self._place()
             unknown = self.found.assignment[self.found.attractor[first:]] != BranchAssignment.ON_BRANCH
