@@ -13,10 +13,9 @@ import saltus
 from saltus.flow import Ending
 from saltus.progress import growing, silent
 from saltus.studies.diagram import side_by_side as module
-from saltus.studies.diagram.diagram_work import DiagramWork
+from saltus.studies.diagram.diagram_work import DiagramWork, all_at_once, side_by_side
 from saltus.studies.diagram.effort import EFFORTS, Effort
 from saltus.studies.diagram.searched_range import MotionStarts, SearchedRange
-from saltus.studies.diagram.side_by_side import all_at_once, side_by_side
 
 AMPLITUDE = "load.horizontal.amplitude"
 

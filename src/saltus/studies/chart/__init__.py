@@ -1,6 +1,7 @@
 """Stability charts: the stable motions beside rest in the plane of two parameters, with exact borders.
 
-`request.py` holds what is asked for, `cells.py` computes the cells of a block of the plane, and `motions.py` is the record of a
-stable motion that all files share. `changes.py` finds where a motion has no counterpart in the neighbouring cell, `follow.py`
-continues it to the special point at which it ends, and `borders.py` follows such points as curves through the plane.
+`chart_study.py` has the functions for users and `chart_request.py` what is asked for. `cells.py` computes the cells of a block of
+the plane, `motions.py` is the record of a stable motion that all files share. `changes.py` finds what becomes of a motion that the
+neighbouring cell lacks; `borders.py` follows its end as a curve through the plane, by `border_work.py`; `chart_checks.py` checks
+charts by other means.
 """

@@ -10,8 +10,7 @@ import numpy as np
 from saltus.attractors import share_interval
 from saltus.checks import check_count, check_dataset
 from saltus.public_functions import answered
-from saltus.studies.chart.border_curves import explained, unseen_folds
-from saltus.studies.chart.border_work import special_point
+from saltus.studies.chart.border_work import explained, special_point, unseen_folds
 from saltus.studies.chart.borders import Borders
 from saltus.studies.chart.cells import computed
 from saltus.studies.chart.changes import COUNTS, ENDS, ChangeOutcome, ChartMotions, changes_of, read_chart

@@ -16,9 +16,8 @@ from saltus.progress import Progress, part_of, silent
 from saltus.studies.diagram.bands import Bands, band_origins
 from saltus.studies.diagram.branch_set import BranchSet, PlacedBranch, placed, stable_motions
 from saltus.studies.diagram.chaos_search import BandSearch
-from saltus.studies.diagram.diagram_work import DiagramWork
+from saltus.studies.diagram.diagram_work import DiagramWork, side_by_side
 from saltus.studies.diagram.effort import EffortSettings
-from saltus.studies.diagram.side_by_side import side_by_side
 from saltus.studies.diagram.simulated import LONG, AttractorsFound, BranchAssignment, SimulatedMotions, starts_at
 from saltus.studies.diagram.simulated import SETTINGS as SIMULATION
 from saltus.systems import System
