@@ -12,7 +12,7 @@ from shared_systems import forced
 import saltus
 from saltus.flow import Ending
 from saltus.progress import growing, silent
-from saltus.studies.diagram import side_by_side as module
+from saltus.studies.diagram import diagram_work as module
 from saltus.studies.diagram.diagram_work import DiagramWork, all_at_once, side_by_side
 from saltus.studies.diagram.effort import EFFORTS, Effort
 from saltus.studies.diagram.searched_range import MotionStarts, SearchedRange
