@@ -172,7 +172,7 @@ def test_where_static_friction_is_larger_a_stick_that_is_lost_ends_the_branch() 
 
 
 def test_a_rest_without_duration_is_where_the_engine_for_one_contact_has_it() -> None:
-    """With that kind and that end."""
+    """With that kind; beyond it the branch goes on, with impacts that do not die away."""
     load = saltus.Load(frequency=1.0, force=saltus.Harmonic(amplitude=1.5, mean=1.0))
     law, numbers = saltus.VelocityReduction(0.4), {"stiffness": 0.2, "damping": 0.1}
     wall = saltus.System(model=saltus.WallOscillator(wall=0.0, **numbers), load=load, impact=law)
@@ -180,9 +180,9 @@ def test_a_rest_without_duration_is_where_the_engine_for_one_contact_has_it() ->
     expected, found = (
         saltus.continue_orbit(saltus.find_orbit(system, x=-0.5), "load.force.amplitude", (1.3, 3.0)) for system in (wall, stops)
     )
-    assert kinds_of(found) == kinds_of(expected) == ["CH"]
+    assert kinds_of(found)[0] == kinds_of(expected)[0] == "CH"
     assert abs(found.special[0].parameter - expected.special[0].parameter) < 1e-8
-    assert found.ends[1].reason is expected.ends[1].reason is OrbitEnd.REST_VANISHES
+    assert found.ends[1].parameter == 3.0
 
 
 @pytest.fixture(scope="module")
@@ -195,10 +195,10 @@ def layers() -> saltus.Branch:
 
 
 def test_along_both_layers_releases_appear_and_the_branch_goes_on(layers: saltus.Branch) -> None:
-    """Up to where the impacts die away only as the next release comes; direct motions beside each point differ."""
-    assert kinds_of(layers) == ["SW", "SW", "RL", "CH"]
-    assert layers.ends[1].reason is OrbitEnd.REST_VANISHES
-    assert max(orbit.defect for orbit in layers.orbits[::6]) < 1e-9
+    """Up to where the impacts die away only as the next release comes, and beyond; direct motions beside each point differ."""
+    assert kinds_of(layers)[:4] == ["SW", "SW", "RL", "CH"]
+    rests = [orbit for orbit in layers.orbits if orbit.signature.section is not None]
+    assert max(orbit.defect for orbit in rests[::6]) < 1e-9
     for point in layers.special[:3]:
         at = [point.parameter * (1.0 + s * 1e-5) for s in (-1, 1)]
         beside = [sequence(point.orbit.system.with_({"load.horizontal.amplitude": a}), point.orbit, 80) for a in at]

@@ -138,3 +138,12 @@ def test_at_a_resonance_without_damping_a_branch_ends_as_its_amplitude_grows():
     assert branch.ends[1].reason is saltus.orbits.OrbitEnd.GROWS
     np.testing.assert_allclose(branch.amplitudes, 1.0 / (1.0 - branch.parameters**2), rtol=1e-9)
     assert 100.0 < branch.amplitudes[-1] < 200.0
+
+
+@pytest.mark.parametrize(("wall", "frequency"), [(0.0, 3.1), (0.3, 2.3)])
+def test_a_search_beside_a_wall_asks_for_no_state_beyond_it(wall, frequency):
+    """Newton's method for near returns stepped beyond it: the search ended with a sentence about a state that nobody gave."""
+    system = walled(A=1.0, W=frequency, wall=wall, e=0.9, c=0.05)
+    found = saltus.search_orbits(system, "load.frequency", [frequency], max_period=4, starts=32)
+    assert len(found.orbits) >= 7
+    assert max(saltus.orbits.defects(list(found.orbits))) < 1e-9

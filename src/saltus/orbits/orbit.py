@@ -253,8 +253,9 @@ class PeriodicOrbit(Result):
 
     @property
     def stable(self) -> bool:
-        """Whether all multipliers lie inside the unit circle, and it does not graze."""
-        return bool((np.abs(self.multipliers) < 1.0).all()) and not self.grazes
+        """Whether all multipliers lie inside the unit circle, by more than rounding, and it does not graze: at a fold or a period
+        doubling it is not stable."""
+        return bool((np.abs(self.multipliers) < 1.0 - TOLERANCES.on_circle).all()) and not self.grazes
 
     def start(self) -> dict[str, Any]:
         """The arguments of `simulate` that start a motion on the orbit: just after its first impact or, without impacts, at phase

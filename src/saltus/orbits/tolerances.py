@@ -18,6 +18,8 @@ class OrbitTolerances:
     halves: float = 1e-7  # The halves of a symmetric orbit: solved to 1e-12, but near a grazing Newton's method leaves more.
     switching: float = 1e-5  # Phases of two events of one contact that vanish together: speeds fall as the third power of these.
     release: float = 1e-9  # Instants of a release, in forcing periods: releases are isolated, and known to rounding.
+    # Moduli of multipliers on the unit circle: those without damping, and at a special point that is located to rounding.
+    on_circle: float = 1e-9
     load: float = 1e-12  # Values of a load and of its mirror image half a period later.
 
 

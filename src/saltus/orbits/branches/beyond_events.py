@@ -22,9 +22,11 @@ from saltus.orbits.branches.bifurcations import FLIP
 from saltus.orbits.branches.images import is_image, nearest, parent_of
 from saltus.orbits.branches.orbit_curve import OrbitPoint
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint
+from saltus.orbits.equations.contract import Restart
 from saltus.orbits.equations.event_sequence import SETTINGS as EVENTS
 from saltus.orbits.equations.event_sequence import EventSequence, OrbitEvent
 from saltus.orbits.equations.read_events import section_of
+from saltus.orbits.finding.starts import start_at
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.tolerances import TOLERANCES
 
@@ -66,6 +68,8 @@ class OtherSideSettings:
     # the two orbits between which it was solved for lie on two branches.
     far: float = 1e-3
     same: float = 0.01  # Two orbits at one value of the parameter are the same within this share of a probe's distance.
+    # Shares of the parameter's range at which orbits are looked for beyond the end of a rest, tried in turn.
+    after_rest: tuple[float, ...] = (1e-5, 1e-4, 1e-3)
     along: float = 1e-6  # The distance to a second orbit on the branch, which gives the tangent at another section.
 
 
@@ -161,18 +165,28 @@ def _stands(point: OrbitPoint) -> bool:
     return bool(orbit.equations.system.model.frictions) and orbit.highest - orbit.lowest < SETTINGS.standing
 
 
-def beyond(cut: Cut, points: Sequence[OrbitPoint]) -> OrbitPoint | End:
+def beyond(cut: Cut, points: Sequence[OrbitPoint]) -> OrbitPoint | Restart | End:
     """The point with which a branch, whose last point is at a cut, goes on beyond it: with other events, or from another
-    section. Or the reason why it ends."""
+    section; or where a motion tells it. Or the reason why it ends."""
     if _stands(cut.point):
         return End(OrbitEnd.STICKS, cut.point.parameter)
     born = parent_of(cut.point) is not None  # at the parent's orbit rounding decides which events are found: exclude none
     sequence = None if born else events_at(cut.point).sequence
     if cut.special is not None and cut.special.kind == SpecialKind.CH:
-        return End(OrbitEnd.REST_VANISHES, cut.point.parameter)
+        return _as_the_motion_goes_on(cut.point)
     if _section_comes(cut.point):
         return _from_another_section(cut.point) or End(OrbitEnd.NO_SECTION, cut.point.parameter)
     return other_events(cut.point, sequence, points)
+
+
+def _as_the_motion_goes_on(point: OrbitPoint) -> Restart:
+    """Beyond the end of a rest: the impacts no longer die away, and the orbit has many of them. Ever more of them towards the end
+    of the rest, where grazings accumulate, so that the branch goes on from a little farther ahead."""
+    way = point.tangent[-len(point.parameters) :]
+    way = way / np.linalg.norm(way / np.array(point.curve.scales))
+    state = start_at(point.orbit.system, point.orbit.section_state)
+    values = [point.parameters + distance * way for distance in SETTINGS.after_rest]
+    return Restart(state, values, End(OrbitEnd.REST_VANISHES, point.parameter))
 
 
 def other_events(point: OrbitPoint, sequence: Events | None, points: Sequence[OrbitPoint] = ()) -> OrbitPoint | End:

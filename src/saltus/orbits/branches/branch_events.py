@@ -9,12 +9,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from saltus.continuation import Continuation, Corrected, Cut, End, Events, Missed, Zero, located
-from saltus.errors import MotionError
+from saltus.errors import SaltusError
+from saltus.flow import simulate
 from saltus.orbits.branches.bifurcations import FLIP, Test, branch_tests, complex_pair, grazing, never_torus
 from saltus.orbits.branches.images import (
     beside_image,
     falls_onto_image,
-    full_period,
     nearest,
     on_family,
     passes_image,
@@ -25,6 +25,7 @@ from saltus.orbits.branches.special_point import OrbitEnd, OrbitMissed, SpecialK
 from saltus.orbits.equations.contract import Restart
 from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.finding.from_motion import orbit_from
+from saltus.orbits.finding.starts import start_at
 from saltus.orbits.signature import Signature
 from saltus.orbits.tolerances import TOLERANCES
 
@@ -42,7 +43,6 @@ class BranchLimits:
     # or the amplitude has shrunk below this share of the largest one, with more impacts than `shrunk_impacts`.
     shrunk: float = 1e-2
     shrunk_impacts: int = 60
-    on_circle: float = 1e-9  # Without damping multipliers lie on the unit circle, up to rounding errors smaller than this.
     smallest: float = 1e-7  # An orbit of an amplitude below this has shrunk to rest.
     # An orbit grows without end if its amplitude exceeds this, and exceeds that of the first orbit of the branch by this factor:
     # a thousand of the longest steps lead there.
@@ -50,6 +50,7 @@ class BranchLimits:
     same_fold: float = 1e-8  # A fold and a crossing of branches whose parameters differ by less than this are one point.
     # A complex pair of multipliers outside the unit circle by more than this, where areas never grow, is an error of saltus.
     impossible_pair: float = 1e-6
+    settling: int = 40  # periods of an orbit for which a motion settles beyond a change; nearly all of its multipliers are 0
     # Distances in both directions along the parent's branch, tried in turn until they enclose its special point.
     reaches: tuple[float, ...] = tuple(10.0 ** np.arange(-8, -0.9))
 
@@ -136,7 +137,7 @@ class BranchEvents(OrbitEvents):
 
     def outside(self, point: OrbitPoint) -> int | None:
         """The number of multipliers outside the unit circle; None at a grazing."""
-        return None if point.orbit.grazes else int(np.count_nonzero(np.abs(point.orbit.multipliers) > 1.0 + SETTINGS.on_circle))
+        return None if point.orbit.grazes else int(np.count_nonzero(np.abs(point.orbit.multipliers) > 1.0 + TOLERANCES.on_circle))
 
     def distinct(self, found: list[Zero]) -> list[Zero]:
         """The special points, without crossings of branches that are only folds, and without the zeros of `torus` that real
@@ -208,20 +209,24 @@ class BranchEvents(OrbitEvents):
 
 
 def restarted(restart: Restart, point: OrbitPoint) -> OrbitPoint | End:
-    """The point with which a branch goes on beyond a point, found from a motion; or why it ends."""
-    paths, period = point.orbit.equations.paths, point.orbit.period
-    base = equations_of(restart.system, Signature((), 1), paths, point.orbit.equations.tol)
-    try:
-        orbit = orbit_from(base, restart.state, period)
-    except MotionError:
-        orbit = None
-    if orbit is None or not orbit.admissible:
-        return restart.end
-    orbit = full_period(orbit) if orbit.symmetric and not point.curve.symmetric else orbit
-    curve, solution = point.curve.with_equations(orbit.equations), orbit.solution
-    found = Corrected(np.append(solution.unknowns, solution.values), solution.evaluation, solution.iterations)
-    ahead = np.append(np.zeros(orbit.equations.size), orbit.solution.values - point.parameters)
-    return curve.with_tangent(found, ahead) or restart.end
+    """The point with which a branch goes on beyond a point, found from a motion that settles there; or why it ends."""
+    equations, period = point.orbit.equations, point.orbit.period
+    for values in restart.values:
+        try:
+            system = equations.at(values)
+            motion = simulate(system, **restart.state, periods=SETTINGS.settling * period, dense=False)
+            state = start_at(system, np.append(motion.position, motion.velocity))
+            orbit = orbit_from(equations_of(system, Signature((), 1), equations.paths, equations.tol), state, period)
+        except SaltusError:
+            continue
+        if orbit is None or not orbit.admissible:
+            continue
+        solution, ahead = orbit.solution, np.append(np.zeros(orbit.equations.size), values - point.parameters)
+        found = Corrected(np.append(solution.unknowns, solution.values), solution.evaluation, solution.iterations)
+        there: OrbitPoint | None = point.curve.with_equations(orbit.equations).with_tangent(found, ahead)
+        if there is not None:
+            return there
+    return restart.end
 
 
 def _accumulate(run: Run, following: OrbitPoint) -> bool:

@@ -94,11 +94,11 @@ class Solution:
 
 
 class Restart(NamedTuple):
-    """A state from which a motion is followed to find the orbit with which a branch goes on beyond a change."""
+    """Where a branch goes on beyond a change, if only a motion tells with which orbits."""
 
-    system: System
     state: dict[str, Any]  # at phase 0, as `simulate` takes it
-    end: End  # why the branch ends if there is no such orbit
+    values: list[np.ndarray]  # of the parameters at which an orbit is looked for, tried in turn
+    end: End  # why the branch ends if there is none
 
 
 class MotionToRead:

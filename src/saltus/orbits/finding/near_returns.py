@@ -15,7 +15,7 @@ from saltus.errors import MotionError
 from saltus.flow import RECURRENCE, last_states, motions_from
 from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.finding.from_motion import orbit_from
-from saltus.orbits.finding.starts import held_by_contacts, start_at, states_beside
+from saltus.orbits.finding.starts import held_by_contacts, on_this_side, start_at, states_beside
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
 from saltus.orbits.verify import same_orbit
@@ -82,7 +82,7 @@ def orbits_near_returns(
 def solved_near(system: System, path: str, state: np.ndarray, period: int) -> PeriodicOrbit | None:
     """The orbit of a system near a state at phase 0 that nearly repeats itself, to be followed along a parameter; or None."""
     try:
-        orbit = orbit_from(equations_of(system, Signature((), 1), (path,)), start_at(system, state), period)
+        orbit = orbit_from(equations_of(system, Signature((), 1), (path,)), start_at(system, on_this_side(system, state.copy())), period)
     except MotionError:
         return None
     return orbit if orbit is not None and orbit.admissible and orbit.amplitude > SETTINGS.still else None

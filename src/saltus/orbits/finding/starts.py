@@ -42,11 +42,8 @@ def within_window(system: System, points: np.ndarray, window: Window, shrunk: An
     """
     rest = rest_state(system)
     states = np.asarray((points * window.half + (window.centre - rest)) * shrunk + rest)
-    model = system.model
-    if len(model.sides) == 1:
-        inward = system.one_contact.inward(model.sides[0])
-        states[..., 0] = rest[0] + inward * np.abs(states[..., 0] - rest[0])
-    return _held(system, on_this_side(system, states), window) if model.contacts else states
+    states = on_this_side(system, states)
+    return _held(system, states, window) if system.model.contacts else states
 
 
 def rest_state(system: System) -> np.ndarray:
@@ -70,8 +67,11 @@ def is_still(system: System, highest: np.ndarray, lowest: np.ndarray, within: fl
 
 
 def on_this_side(system: System, states: np.ndarray) -> np.ndarray:
-    """States (..., d), changed in place: those beyond one of several contacts are reflected at it."""
+    """States (..., d), changed in place: those beyond a wall, or beyond one of several contacts, are reflected at it."""
     names = system.model.coordinates
+    if len(system.model.sides) == 1:
+        wall, inward = float(system.one_contact.contact), system.one_contact.inward(system.model.sides[0])
+        states[..., 0] = wall + inward * np.abs(states[..., 0] - wall)
     for contact in system.model.contacts:
         place, position = names.index(contact.coordinate), float(contact.position)
         states[..., place] = position + contact.sign * np.abs(states[..., place] - position)

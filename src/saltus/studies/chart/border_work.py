@@ -39,8 +39,8 @@ def curve_dataset(curve: Any, paths: Sequence[str]) -> xarray.Dataset:
         data[name] = ("point", curve.parameters[:, i])
     kept: xarray.Dataset = data[["horizontal", "vertical", "amplitude", "residual", "special_kind"]]
     kept["special_place"] = (("special", "axis"), data["special_parameter"].values[:, order])
-    signature = curve.orbits[0].signature
-    kept.attrs = {**data.attrs, "period": signature.period, "impact_count": signature.impact_count, "path": list(paths)}
+    orbit = curve.orbits[0]
+    kept.attrs = {**data.attrs, "period": orbit.period, "impact_count": orbit.impact_count, "path": list(paths)}
     return kept
 
 

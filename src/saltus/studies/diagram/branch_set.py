@@ -47,7 +47,7 @@ class PlacedBranch:
     def columns(self) -> np.ndarray:
         """Parameter, highest, lowest, stability, period, impacts and slowest impact of each point, (7, n)."""
         rows = [
-            (value, o.highest, o.lowest, o.stable, o.period, o.signature.impact_count, _slowest(o))
+            (value, o.highest, o.lowest, o.stable, o.period, o.impact_count, _slowest(o))
             for value, o in zip(self.branch.parameters.tolist(), self.branch.orbits, strict=True)
         ]
         return np.array(rows, dtype=float).reshape(-1, 7).T
