@@ -313,7 +313,7 @@ class PeriodicOrbit(Result):
         start = self.start()
         if not start.get("time", 0.0):
             position = [start[name] for name in self.system.model.coordinates]
-            return (*position, start["velocity"]) if len(position) == 1 else (np.array(position), np.array(start["velocity"]))  # type: ignore[return-value]
+            return (*position, start["velocity"]) if len(position) == 1 else (np.array(position), np.array(start["velocity"]))
         period = 2.0 * math.pi / self.frequency
         ahead = max(1, math.ceil(start["time"] / period)) * period - start["time"]
         motion = simulate(self.system, **start, duration=ahead, tol=1e-13, dense=False)

@@ -16,7 +16,9 @@ from saltus.orbits.equations.contract import OrbitEquations
 from saltus.orbits.signature import Signature
 from saltus.orbits.tolerances import TOLERANCES
 
-PROBES = 10.0 ** -np.arange(2, 12.0)  # distances along the new branch, tried in turn until one direction has admissible orbits
+PROBES: tuple[float, ...] = tuple(
+    10.0 ** -np.arange(2, 12.0)
+)  # distances along the new branch, tried in turn until one direction has admissible orbits
 
 
 def other_side(point: OrbitPoint) -> OrbitPoint | End:
@@ -111,7 +113,7 @@ def _without_impacts(point: OrbitPoint, slow: int) -> tuple[Any, np.ndarray] | E
     phase_zero = 2.0 * np.pi * np.ceil(touch / (2.0 * np.pi))
     contact = np.array([float(equations.at(point.solution.values).model.contact), 0.0])
     for periods in range(1, signature.period + 1):  # families of several periods may meet here: take the shortest period
-        other = equations.with_signature(Signature((), periods, False, side))
+        other: Any = equations.with_signature(Signature((), periods, False, side))
         state = other.carried(contact, touch, phase_zero, point.solution.values)
         later = other.carried(contact, touch, phase_zero + other.closing, point.solution.values)
         if state is not None and later is not None and np.abs(later - state).max() < TOLERANCES.touching_state:

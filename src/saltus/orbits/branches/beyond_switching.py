@@ -49,7 +49,8 @@ class Switching:
     @classmethod
     def at(cls, point: OrbitPoint) -> Switching:
         """A point of a curve, with its equations and its events."""
-        equations, evaluation = point.orbit.equations, point.solution.evaluation
+        equations: Any = point.orbit.equations
+        evaluation = point.solution.evaluation
         phases = equations.split(point.solution.unknowns)[1].tolist()
         return cls(point, equations, evaluation, tuple(map(Timed, equations.signature.events, phases)))
 
@@ -155,7 +156,10 @@ class Switching:
         begin = self.events[0].phase if self.events else 0.0
         end = phase if not self.events else 2.0 * np.pi * np.ceil(begin / (2.0 * np.pi))
         closed, start = int(self.equations.plan[0, SegmentPlan.ALONG]), self.evaluation.ends[0, SegmentEnd.NUMBERS :][:n]
-        return self.equations.carried_along(start, closed, np.array([begin, end]) / frequency, self.point.solution.values)
+        state: np.ndarray | None = self.equations.carried_along(
+            start, closed, np.array([begin, end]) / frequency, self.point.solution.values
+        )
+        return state
 
 
 def from_next_event(point: OrbitPoint) -> OrbitPoint:
@@ -184,7 +188,7 @@ def cycle_of(signature: Signature) -> Cycle:
 
 def begins_excursion(point: OrbitPoint) -> bool:
     """Whether a point has an excursion of no duration after a release: its multipliers and its tangent then have no meaning."""
-    equations = point.orbit.equations
+    equations: Any = point.orbit.equations
     if not equations.signature.events:
         return False
     phases = equations.split(point.solution.unknowns)[1]

@@ -113,7 +113,8 @@ class BranchEvents(OrbitEvents):
         found = super().cut(point, ahead)
         if not isinstance(found, Cut) or found.special is None:
             return found
-        return found.point.orbit.equations.change(found.special, point)
+        changed: Cut | End = found.point.orbit.equations.change(found.special, point)
+        return changed
 
     def interrupted(self, run: Run, point: OrbitPoint, ahead: OrbitPoint) -> End | None:
         """The end of a family that reaches orbits that are their own images: at the BPC or PD of the parent's branch at which the

@@ -156,7 +156,8 @@ class ContactsEquations(OrbitEquations):
         phases = self.split(solution.unknowns)[1]
         apart = np.diff(np.append(phases, phases[:1] + self.closing))
         columns = [SegmentExtremes.FORCE, SegmentExtremes.PULL, SegmentExtremes.TAIL, SegmentExtremes.BESIDE]
-        return float(min(solution.evaluation.seen[:, columns].min(), apart.min(initial=math.inf)))
+        evaluation: Any = solution.evaluation
+        return float(min(evaluation.seen[:, columns].min(), apart.min(initial=math.inf)))
 
     def nearest(self, unknowns: np.ndarray, values: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
         """Unchanged: events are not renumbered."""

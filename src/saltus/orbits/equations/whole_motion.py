@@ -119,7 +119,8 @@ class WholeMotionEquations(OrbitEquations):
         odd, unknowns = self.signature.period % 2, solution.unknowns
         if self.signature.symmetric or (odd and not mirrored):
             return None
-        middle = solution.evaluation.middle
+        evaluation: Any = solution.evaluation
+        middle = evaluation.middle
         if middle is None:
             found = self.halved.evaluate(unknowns, solution.values)
             return None if found is None else np.stack([unknowns, unknowns + found.residual])

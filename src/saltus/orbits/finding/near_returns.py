@@ -82,7 +82,8 @@ def orbits_near_returns(
 def solved_near(system: System, path: str, state: np.ndarray, period: int) -> PeriodicOrbit | None:
     """The orbit of a system near a state at phase 0 that nearly repeats itself, to be followed along a parameter; or None."""
     try:
-        orbit = orbit_from(equations_of(system, Signature((), 1), (path,)), start_at(system, on_this_side(system, state.copy())), period)
+        start = start_at(system, on_this_side(system, state.copy()))
+        orbit = orbit_from(equations_of(system, Signature((), 1), (path,)), start, period)
     except MotionError:
         return None
     return orbit if orbit is not None and orbit.admissible and orbit.amplitude > SETTINGS.still else None
