@@ -1,6 +1,7 @@
 """Figs. 14 and 15 from coarse charts: their data say what they are, their claims follow from them, their pictures are whole."""
 
 import functools
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -103,7 +104,7 @@ def test_statements_on_parameters_compare_charts_of_the_same_cells():
     made = FIGURES["fig15"].compute(charts=quick, size=9, curves=2, starts=4)
     claims = claims_of(chart_measures.over_parameters(made))
     assert claims["fig15-damping-domain"].verdict is ClaimVerdict.AS_PRINTED
-    assert len(claims) == 6
+    assert len(claims) == 8
     picture = FIGURES["fig15"].draw(made)
     assert clipped(picture) == []
     titles = [ax.get_title() for ax in picture.axes]
@@ -294,7 +295,7 @@ def test_erratum_45_the_largest_amplitudes_are_not_at_the_primary_resonance():
     assert 1.0 < max(sizes) < 2.5
 
 
-def test_erratum_46_many_motions_grow_with_the_angle():
+def test_at_many_loads_the_largest_motion_grows_with_the_angle():
     loads = (1.0, 0.34, -1.78)
     small = orbit(*loads, (-0.26770572621516836, -0.8742079345290514), beta0=60.0)
     large = orbit(*loads, (1.8737291481902785, -0.0598247852122814), beta0=80.0)
@@ -310,3 +311,34 @@ def test_erratum_46_many_motions_grow_with_the_angle():
         repelling=0,
     )
     assert max(one.amplitude for one in lowered.orbits if one.stable) == pytest.approx(small.amplitude, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("second", "falls", "grows"),
+    [
+        ([1.0, 2.5, 0.9, 5.0], ClaimVerdict.DISAGREES, ClaimVerdict.HOLDS),
+        ([1.0, 2.5, 0.9, np.nan], ClaimVerdict.AS_PRINTED, ClaimVerdict.HOLDS),  # the largest one falls, the first one grows
+        ([0.4, 2.5, 0.9, np.nan], ClaimVerdict.AS_PRINTED, ClaimVerdict.DISAGREES),
+    ],
+)
+def test_the_largest_amplitude_of_a_chart_is_judged_apart_from_those_of_its_cells(second, falls, grows, monkeypatch):
+    monkeypatch.setattr(chart_measures, "chart_cells", lambda sizes: SimpleNamespace(amplitude=np.array(sizes)))
+    charts = {60.0: [0.5, 3.0, 1.0, np.nan], 80.0: second}
+    measures = {"fig15-angle-amplitude": chart_measures._amplitude_falls(charts)}
+    measures["fig15-angle-cells"] = chart_measures._some_grow(charts)
+    assert list(verdicts(measures).values()) == [falls, grows]
+
+
+@pytest.mark.parametrize(
+    ("low", "shape", "place"),
+    [
+        (3.2, ClaimVerdict.AS_PRINTED, ClaimVerdict.HOLDS),  # tan(80 deg) / tan(60 deg) = 3.27
+        (1.0, ClaimVerdict.DISAGREES, ClaimVerdict.DISAGREES),  # a border that stays where it is has another shape over Hcr
+    ],
+)
+def test_the_place_of_the_border_and_its_shape_are_told_apart(low, shape, place, monkeypatch):
+    monkeypatch.setattr(chart_measures, "onset", lambda factor, rows: factor * np.abs(rows))
+    charts = {60.0: low, 80.0: 1.0}
+    measures = {"fig15-angle-border": chart_measures._border_and_angle(charts)}
+    measures["fig15-angle-place"] = chart_measures._place_and_angle(charts)
+    assert list(verdicts(measures).values()) == [shape, place]

@@ -110,7 +110,7 @@ def test_a_statement_that_is_not_checked_needs_no_measure_and_gives_its_reason(m
     monkeypatch.setattr("saltus_paper.claims.claim.claim_tables", lambda: tables)
     (claim,) = judge("fig99", {})
     assert (claim.verdict, claim.evidence) == (ClaimVerdict.NOT_CHECKED, "it is about experiments")
-    with pytest.raises(SaltusError, match="no claim 'x'"):
+    with pytest.raises(SaltusError, match="no claim of its table asks for: x"):
         judge("fig99", {"x": measured(True)})
 
 

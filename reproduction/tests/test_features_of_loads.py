@@ -11,13 +11,13 @@ from test_errata import crossings
 
 import saltus
 from saltus.branch_tables import branch_tables
-from saltus.theory import critical_horizontal
+from saltus.theory import critical_horizontal, static_angle
 from saltus_paper import ClaimVerdict
 from saltus_paper.figures import fig13
 from saltus_paper.figures.harmonic_loads import AMPLITUDE, under_both, under_force
 from saltus_paper.figures.knots_and_jumps import birth
 from saltus_paper.figures.load_diagrams import undeformed
-from saltus_paper.measures.response_measures import _anticipated, border_of_rest, coexistence
+from saltus_paper.measures.response_measures import _anticipated, _static_unit, border_of_rest, coexistence
 
 
 @pytest.fixture(scope="module")
@@ -173,3 +173,15 @@ def counted(*branches, dots):
 )
 def test_erratum_38_the_number_of_stable_motions_rises_and_falls(tree, verdict):
     assert verdicts({"fig11-coexistence": coexistence({1.0: tree})})["fig11-coexistence"] is verdict
+
+
+@pytest.mark.parametrize("amplitude", [0.2, 1.0, 3.0])
+def test_theta_st_is_where_a_slowly_growing_load_leads(amplitude):
+    """By a motion, for which the claim has the balance of moments: H rises from 0 to its amplitude in 2000 units of time."""
+    load = saltus.Load(horizontal=saltus.Ramp(amplitude=amplitude, duration=2000.0), vertical=-0.5)
+    slow = saltus.System(model=saltus.Metainterface(beta0=math.radians(80), damping=0.5), load=load)
+    reached = saltus.simulate(slow, theta=0.0, velocity=0.0, duration=2400.0, dense=False).position
+    assert reached == pytest.approx(static_angle(math.radians(80), amplitude, -0.5), abs=1e-6)
+    for scale, verdict in ((reached, ClaimVerdict.AS_PRINTED), (1.001 * reached, ClaimVerdict.DISAGREES)):
+        spectrum = xr.DataTree(xr.Dataset(attrs={"scale": scale}))
+        assert verdicts({"fig09-static": _static_unit({amplitude: spectrum})})["fig09-static"] is verdict

@@ -207,7 +207,7 @@ def _checked(entry: ClaimEntry, measured: Measured) -> tuple[str, str, ClaimVerd
     printed, corrected = measured.outcome, measured.corrected
     agrees, mended = (one is not None and _holds(one, entry.tolerance) for one in (printed, corrected))
     verdict = _true(entry) if agrees else ClaimVerdict.CORRECTED if mended and entry.erratum else ClaimVerdict.DISAGREES
-    if corrected is None:
+    if corrected is None or agrees:  # what holds as printed needs no correction beside it
         return "as stated", _outcome_text(printed), verdict
     return f"as printed: {_outcome_text(printed)}", f"corrected: {_outcome_text(corrected)}", verdict
 

@@ -131,7 +131,7 @@ def ground_spectra(panels: Panels, transients: Any) -> dict[str, Measured]:
     largest = max(panels)
     return {
         "fig10-quasi-periodic": _quasi_periodic(panels[largest], CRITERIA.high),
-        "fig10-chaos": _at_high_frequency(panels, transients),
+        **_at_high_frequency(panels, transients),
         "fig10-pierced": pierced(panels[largest], load=largest),
     }
 
@@ -143,8 +143,8 @@ def _wandering(spectrum: Any) -> np.ndarray:
     return np.asarray(table["value"].values[positive])
 
 
-def _at_high_frequency(panels: Panels, transients: Any) -> Measured:
-    """As printed: the unsettled motions there are chaotic, the more the larger the load. Erratum 31: most are transients."""
+def _at_high_frequency(panels: Panels, transients: Any) -> dict[str, Measured]:
+    """Chaos is there, the more the larger the load, as printed; in addition (31), at most values it is a transient."""
     seen = [_wandering(tree) for tree in panels.values()]
     seen = [values[values > CRITERIA.high] for values in seen]
     bands = [[band for band in bands_of(tree) if band["low"] > CRITERIA.high] for tree in panels.values()]
@@ -155,15 +155,16 @@ def _at_high_frequency(panels: Panels, transients: Any) -> Measured:
     counts, settled = [values.size for values in seen], transients["settled"].values
     grows = counts[-1] > 0 and bool((np.diff(counts) > 0).all())
     falls = bool((np.diff(settled) > 0).all()) and int(transients["returned"]) == 0
-    return measured(
-        grows and 2 * lasting[-1] >= counts[-1],
-        grows and 2 * lasting[-1] < counts[-1],
-        second=falls,
-        panels=[{"load": load, "values": n, "lasting": m} for load, n, m in zip(panels, counts, lasting, strict=True)],
-        bands=bands[-1],
-        motions=int(transients["motions"]),
-        settled=[{"number": int(n), "periods": int(p)} for n, p in zip(settled, transients["periods"].values, strict=True)],
-    )
+    rows = [{"load": load, "values": n, "lasting": m} for load, n, m in zip(panels, counts, lasting, strict=True)]
+    return {
+        "fig10-chaos": measured(grows and bool(bands[-1]), panels=rows, bands=bands[-1]),
+        "fig10-transients": measured(
+            falls and 2 * lasting[-1] < counts[-1],
+            panels=rows,
+            motions=int(transients["motions"]),
+            settled=[{"number": int(n), "periods": int(p)} for n, p in zip(settled, transients["periods"].values, strict=True)],
+        ),
+    }
 
 
 def force_diagrams(panels: Panels) -> dict[str, Measured | None]:
