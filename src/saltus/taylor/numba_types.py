@@ -2,7 +2,8 @@
 
 * Functions that are given by their addresses (`PointedFunction`): those of a structure, which are written for LLVM, and numba's
   own. A call is one instruction; numba's first-class functions are first asked, by Python code, where they are.
-* Tuples that are given by their address (`Reference`): passed by value, a tuple of many arrays would be hundreds of arguments.
+* Tuples that are given by their address (`Reference`): by value, a tuple of many arrays would be hundreds of arguments. The
+  fields of named tuples, and of the named tuples and records in them, are attributes; those of records can be set.
 * Functions and operators whose LLVM code is written here (`inlined`, `operator_meaning`), for the vectors of the lanes.
 
 A function that is written for LLVM is called with numbers and addresses alone, so that it can also be called from C, by `ctypes`
@@ -25,6 +26,7 @@ from numba.extending import (
     intrinsic,
     lower_builtin,
     lower_getattr_generic,
+    lower_setattr_generic,
     models,
     register_model,
     type_callable,
@@ -62,7 +64,9 @@ class Reference(types.BaseTuple):
 
     @property
     def mangling_args(self) -> Any:
-        return self.__class__.__name__, (self.of,)
+        """The names of compiled functions contain those of their arguments' types, which would be long."""
+        named = isinstance(self.of, types.BaseNamedTuple)
+        return f"{self.__class__.__name__}{self.of.instance_class.__name__ if named else ''}", () if named else (self.of,)
 
     def __len__(self) -> int:
         return self.count
@@ -85,21 +89,60 @@ def _element(context: Any, builder: Any, place: Any, index: int, kind: Any) -> A
     return value
 
 
+def path_to(kind: Any, name: str) -> tuple[Any, ...] | None:
+    """The way to a field of a named tuple, or of the named tuples and records within it: indices, then a record's field."""
+    for i, (field, inner) in enumerate(zip(kind.fields, kind.types, strict=True)):
+        if field == name:
+            return (i,)
+        if isinstance(inner, types.Record) and name in inner.fields:
+            return i, name
+        deeper = path_to(inner, name) if isinstance(inner, types.BaseNamedTuple) else None
+        if deeper is not None:
+            return i, *deeper
+    return None
+
+
 def field_type(reference: Reference, name: str) -> Any:
-    """The type of a field of a named tuple by its `Reference`, or None; a tuple among the fields is a `Reference` too."""
-    if name not in getattr(reference.of, "fields", ()):
+    """The type of a field of a named tuple by its `Reference`, or None; a named tuple among the fields is a `Reference` too."""
+    path = path_to(reference.of, name) if isinstance(reference.of, types.BaseNamedTuple) else None
+    if path is None:
         return None
-    kind = reference.types[reference.of.fields.index(name)]
-    return Reference(kind) if isinstance(kind, types.BaseTuple) else kind
+    kind: Any = reference.of
+    for step in path:
+        kind = kind.typeof(step) if isinstance(step, str) else kind.types[step]
+    return Reference(kind) if isinstance(kind, types.BaseNamedTuple) else kind
+
+
+def _owner(builder: Any, kind: Any, value: Any, path: tuple[Any, ...]) -> tuple[Any, Any]:
+    """The type of what has the last field of a path, and LLVM's value of it: a tuple's address, or a record."""
+    for step in path[:-1]:
+        kind = kind.types[step]
+        value = builder.gep(value, [INDEX(0), INDEX(step)], inbounds=True)
+    return kind, builder.load(value) if isinstance(kind, types.Record) else value
 
 
 @lower_getattr_generic(Reference)  # type: ignore[untyped-decorator]
 def _field(context: Any, builder: Any, kind: Any, value: Any, attr: str) -> Any:
-    """A field of a named tuple."""
-    index = kind.of.fields.index(attr)
-    if isinstance(kind.of.types[index], types.BaseTuple):
-        return builder.gep(value, [INDEX(0), INDEX(index)], inbounds=True)
-    return _element(context, builder, value, index, kind.of.types[index])
+    """The value of a field."""
+    path = path_to(kind.of, attr)
+    assert path is not None
+    owner, value = _owner(builder, kind.of, value, path)
+    if isinstance(owner, types.Record):
+        return context.get_getattr(owner, attr)(context, builder, owner, value, attr)
+    found = owner.types[path[-1]]
+    if isinstance(found, types.BaseNamedTuple):
+        return builder.gep(value, [INDEX(0), INDEX(path[-1])], inbounds=True)
+    return _element(context, builder, value, path[-1], found)
+
+
+@lower_setattr_generic(Reference)  # type: ignore[untyped-decorator]
+def _set_field(context: Any, builder: Any, signature: Any, args: Any, attr: str) -> None:
+    """Set a record's field."""
+    kind, new = signature.args
+    path = path_to(kind.of, attr)
+    assert path is not None
+    owner, record = _owner(builder, kind.of, args[0], path)
+    context.get_setattr(attr, signature.replace(args=(owner, new)))(builder, (record, args[1]))
 
 
 @intrinsic
