@@ -10,14 +10,11 @@ import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from saltus.errors import ParameterError, shown
-
-if TYPE_CHECKING:
-    pass
 
 RADIANS = {"unit": "rad"}  # the metadata of a dataclass's field that is an angle
 
@@ -261,56 +258,6 @@ def check_axis(name: str, values: Any) -> np.ndarray:
     if axis.ndim != 1 or not axis.size or not (np.abs(axis) <= LIMITS.value).all() or not (np.diff(axis) > 0).all():
         raise ParameterError(f"{name} must be numbers that rise, each above the one before, got {shown(values)}", name)
     return axis
-
-
-def check_path(system: Any, path: Any, name: str = "path") -> None:
-    """Refuse anything but the dotted path of a number of the system.
-
-    Raises
-    ------
-    ParameterError
-        The error is of the argument `name` and gives similar paths.
-    """
-    if isinstance(path, str) and path in system.parameters:
-        return
-    try:
-        system.get(path)
-    except ParameterError as error:
-        raise ParameterError(str(error), name) from None
-    raise ParameterError(f"{path} is not a number, so nothing can be computed along it", name)
-
-
-def check_along(system: Any, path: str, values: Iterable[float], name: str) -> None:
-    """Refuse values of the parameter at `path` that the system does not allow.
-
-    Raises
-    ------
-    ParameterError
-        The error is of the argument `name` and has the system's refusal.
-    """
-    for value in values:
-        try:
-            system.with_({path: float(value)})
-        except ParameterError as error:
-            raise ParameterError(f"{name} reach beyond what the system allows: {error}", name) from None
-
-
-def check_reached(model: Any, coordinate: str, values: Any, name: str) -> None:
-    """Refuse values of a coordinate that a contact does not let it reach.
-
-    Raises
-    ------
-    ParameterError
-        The error is of the argument `name` and has the first such value and the contact.
-    """
-    given = np.atleast_1d(values)
-    gaps = {repr(c.name): (c.gap(given), c.position) for c in model.contacts if c.coordinate == coordinate}
-    if model.sides and coordinate == model.coordinates[0]:
-        gaps[""] = np.max([np.asarray(model.gap(given, side)) for side in model.sides], axis=0), model.contact
-    for contact, (gap, position) in gaps.items():
-        if (beyond := given[np.asarray(gap) < 0.0]).size:
-            where = f"the contact {contact}".strip() + f" at {coordinate} = {float(position):g}"
-            raise ParameterError(f"{coordinate} = {beyond[0]:g} lies beyond {where}; leave such values out", name)
 
 
 def check_names(name: str, values: Any, meaning: str) -> tuple[str, ...]:

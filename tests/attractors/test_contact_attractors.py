@@ -7,7 +7,6 @@ import pytest
 
 from saltus.attractors import attractors_along, basins_of_attraction, find_attractors
 from saltus.errors import ParameterError
-from saltus.orbits import initial_states
 from saltus.systems import (
     Harmonic,
     ImpactPair,
@@ -19,8 +18,9 @@ from saltus.systems import (
     TwoStops,
     VelocityReduction,
     WallOscillator,
+    check_window,
+    initial_states,
 )
-from saltus.window import check_window
 
 BETA80 = math.radians(80)
 

@@ -11,7 +11,7 @@ from saltus.attractors.attractor_search import Attractors, find_attractors
 from saltus.attractors.basins.basin_cells import Labelling
 from saltus.attractors.basins.boundaries import clipped, edge_saddles, edges
 from saltus.attractors.basins.grid import basins_of_attraction
-from saltus.window import Window
+from saltus.systems import Window
 
 SYSTEM = forced(W=0.88)
 GRID = np.linspace(-2.5, 2.5, 31)

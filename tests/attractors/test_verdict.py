@@ -11,7 +11,7 @@ from saltus import ParameterError
 from saltus.attractors import classify, excludes_tori, zero_one_test
 from saltus.attractors.orbit_certificate import certify
 from saltus.flow import Ending, find_recurrence
-from saltus.orbits import state_vector
+from saltus.systems import state_of
 from saltus.theory import equilibria
 
 
@@ -90,7 +90,7 @@ def test_chaos_in_several_narrow_bands_of_the_section_is_chaos():
     assert verdict.exponents.values[0] - verdict.exponents.errors[0] > 0.0
     assert verdict.exponents.values[0] == pytest.approx(verdict.evidence["largest_exponent"], rel=0.3)
     assert verdict.zero_one.K > 0.8
-    section = find_recurrence(system, state_vector(system, verdict.state)[None], 4000, kept=4000).states[0, :, 0]
+    section = find_recurrence(system, state_of(system, verdict.state)[None], 4000, kept=4000).states[0, :, 0]
     assert zero_one_test(section).K < 0.2
 
 

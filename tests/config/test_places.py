@@ -4,12 +4,12 @@ import math
 
 import pytest
 
-from saltus.checks import check_along, check_bounds, check_count, check_number, check_path
+from saltus.checks import check_bounds, check_count, check_number
 from saltus.errors import ParameterError
 from saltus.flow import simulate
 from saltus.public_functions import checked_by
 from saltus.studies import phase_portrait, response_spectrum, stability_chart
-from saltus.systems import Harmonic, Load, Metainterface, RockingBlock, System, VelocityReduction
+from saltus.systems import Harmonic, Load, Metainterface, RockingBlock, System, VelocityReduction, check_along, check_path
 
 SYSTEM = System(
     model=Metainterface(beta0=1.4, damping=0.1), load=Load(frequency=1.0, horizontal=Harmonic(amplitude=0.5), vertical=-0.5)

@@ -63,6 +63,10 @@ CASES = {
         "load.vertical.amplitude must be at most 1e+100 in size, got -1e+101",
     ),
     "no_module": ('[model]\ntype = "../x:Y"\n', 'model.type: the text "../x" is no Python file, such as my_model.py'),
+    "one_contact": (
+        MODEL + '[impact]\ntype = "NewtonImpact"\ne = 0.5\n',
+        "a Metainterface passes its contact and does not bounce there, so that impact.e must be 0, got 0.5",
+    ),
     "smoothing": (MODEL + "smoothing = 100\nmass_ratio = 1\n", "model.smoothing is for symmetric layers only"),
     "e": (MODEL + '[impact]\ntype = "VelocityReduction"\ne = 1.2\n', "impact.e must lie in [0, 1], got 1.2"),
     "impact_type": (

@@ -15,8 +15,7 @@ from saltus.studies.diagram.chaos_search import BandSearch
 from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.effort import CHAOS
 from saltus.studies.diagram.simulated import simulate_from, starts_at
-from saltus.systems import Harmonic, Load, System
-from saltus.window import check_window
+from saltus.systems import Harmonic, Load, System, check_window
 
 WINDOW = ((-4.0, 4.0), (-4.0, 4.0))
 AMPLITUDE, FREQUENCY = "load.horizontal.amplitude", "load.frequency"

@@ -13,9 +13,8 @@ from saltus.studies import stability_chart
 from saltus.studies.chart.cells import beyond_limits, joined, seeds, starts
 from saltus.studies.chart.changes import monostable
 from saltus.studies.chart.motions import distinct, has_alike, motion_type
-from saltus.systems import Harmonic, Load, Metainterface, System, TwoStops, VelocityReduction
+from saltus.systems import Harmonic, Load, Metainterface, System, TwoStops, VelocityReduction, check_window
 from saltus.theory import equilibria, unloaded_fold
-from saltus.window import check_window
 
 H, V = "load.horizontal.amplitude", "load.vertical"
 ONSET = 0.0219879514  # Hhat of the fold at V = -0.5, Omega = 1 (issue 5)

@@ -11,7 +11,7 @@ import saltus
 from saltus import branch_of
 from saltus.attractors import Reason, judge
 from saltus.flow import Ending, Stop
-from saltus.orbits import initial_states, orbits_near_returns, search_orbits, solved_near
+from saltus.orbits import orbits_near_returns, search_orbits, solved_near
 from saltus.plots import draw_diagram, draw_stability_chart
 from saltus.studies import bifurcation_diagram, bordered_chart, response_spectrum, stability_chart
 from saltus.studies.chart.motions import CellOutcome
@@ -30,8 +30,9 @@ from saltus.systems import (
     TwoLayer,
     TwoStops,
     VelocityReduction,
+    check_window,
+    initial_states,
 )
-from saltus.window import check_window
 
 BETA80 = math.radians(80)
 FORCE, H = "load.force.amplitude", "load.horizontal.amplitude"

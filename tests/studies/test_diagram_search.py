@@ -14,8 +14,7 @@ from saltus.orbits.equations.newton import solve
 from saltus.studies import response_spectrum
 from saltus.studies.diagram.diagram_search import MissedShare
 from saltus.studies.diagram.simulated import starts_at
-from saltus.systems import Harmonic
-from saltus.window import check_window
+from saltus.systems import Harmonic, check_window
 
 WINDOW = ((-4.0, 4.0), (-4.0, 4.0))
 SYSTEM = forced(1.0)

@@ -10,12 +10,11 @@ import numpy as np
 
 from saltus.attractors.attractor import REST, Attractor, Attractors, Target, about, attractor_columns, variable
 from saltus.attractors.attractor_search import find_attractors
-from saltus.checks import as_numbers, check_along, check_number, check_path
+from saltus.checks import as_numbers, check_number
 from saltus.errors import ParameterError, shown
 from saltus.flow import Ending
 from saltus.progress import Progress, part_of, silent
-from saltus.systems import System
-from saltus.window import Box
+from saltus.systems import Box, System, check_along, check_path
 
 if TYPE_CHECKING:
     import xarray

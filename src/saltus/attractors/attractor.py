@@ -16,8 +16,7 @@ from saltus.flow import Ending, extrema_names, state_names
 from saltus.orbits import PeriodicOrbit
 from saltus.provenance import provenance
 from saltus.result import Result
-from saltus.systems import System
-from saltus.window import Window
+from saltus.systems import System, Window
 
 if TYPE_CHECKING:
     import xarray

@@ -13,14 +13,24 @@ from saltus.attractors.attractor import LAST_STATES, REST, SAME_STATE, UNDECIDED
 from saltus.attractors.classification import classify
 from saltus.attractors.orbit_certificate import solved_orbit, stays_at_rest
 from saltus.attractors.stroboscopic_section import section_states, with_clock
-from saltus.checks import check_count, check_number, check_reached, check_starts, check_states
+from saltus.checks import check_count, check_number, check_starts, check_states
 from saltus.errors import ParameterError
 from saltus.flow import RECURRENCE, Ending, Recurrence, extrema_names, find_recurrence, motions_from, stroboscopic
-from saltus.orbits import Branch, PeriodicOrbit, before_impacts, initial_states, is_symmetric, rest_state, start_at, state_vector
+from saltus.orbits import Branch, PeriodicOrbit, is_symmetric
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import checked_by
-from saltus.systems import System, image_of
-from saltus.window import Box, check_window
+from saltus.systems import (
+    Box,
+    System,
+    arguments_of,
+    before_impacts,
+    check_reached,
+    check_window,
+    image_of,
+    initial_states,
+    rest_state,
+    state_of,
+)
 
 
 @dataclass(frozen=True)
@@ -149,10 +159,10 @@ class KnownAttractors:
 
     def judge(self, state: np.ndarray, max_period: int) -> int:
         """Classify a motion that does not settle, from a state (d,): the label of its attractor, or UNDECIDED if it has none."""
-        start, longest = start_at(self.system, state), max(max_period, 16)
+        start, longest = arguments_of(self.system, state), max(max_period, 16)
         verdict = classify(self.system, **start, periods=SETTINGS.second, max_period=longest)
         if verdict.kind is Ending.REST:
-            return self.add_rest(self._rest_state(state_vector(self.system, verdict.state)))
+            return self.add_rest(self._rest_state(state_of(self.system, verdict.state)))
         if verdict.orbit is not None and verdict.kind is Ending.PERIODIC:
             return self.add_orbit(verdict.orbit)
         where = f"from {_shown(state)}"

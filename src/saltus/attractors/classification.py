@@ -21,18 +21,19 @@ from saltus.attractors.stroboscopic_section import with_clock
 from saltus.attractors.tori import excludes_tori
 from saltus.attractors.zero_one import FEWEST_ENTRIES, ZeroOne, zero_one_of_bands
 from saltus.checks import check_count, check_number
-from saltus.errors import MotionError, ParameterError
+from saltus.errors import MotionError
 from saltus.flow import RECURRENCE, Ending, Recurrence, find_recurrence, simulate
 from saltus.notebook import html_table
-from saltus.orbits import PeriodicOrbit, start_at, state_vector
+from saltus.orbits import PeriodicOrbit
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import Numbers
 from saltus.result import Result, result_dataset
-from saltus.systems import System
+from saltus.systems import System, arguments_of, read_start, state_of
 
 if TYPE_CHECKING:
     import xarray
 
+NAMES = ("periods", "transient", "max_period", "seed", "tol")  # arguments of `classify`
 SECTION_STATES = 1000  # states of a motion that does not repeat, enough to see the shape of its attractor
 
 
@@ -104,7 +105,7 @@ class Verdict(Result):
 
     def _section(self) -> np.ndarray:
         """States at phase 0 from the end of the motion on, (n, d): those of one period, or many if it does not repeat itself."""
-        end = state_vector(self.system, self.state)
+        end = state_of(self.system, self.state)
         lasting = self.kind not in (Ending.REST, Ending.UNDECIDED) and self.system.load.period is not None
         if not lasting:
             return end[None]
@@ -154,7 +155,7 @@ class _Case:
         """A verdict on a motion with these `ends`, for a cause whose sentence is filled with these numbers."""
         given: dict[str, Any] = (
             dict.fromkeys(("period", "orbit", "exponents", "zero_one"))
-            | {"state": start_at(self.system, ends.states[0, -1]), "reason": ""}
+            | {"state": arguments_of(self.system, ends.states[0, -1]), "reason": ""}
             | more
         )
         given["reason"] = given["reason"] or cause.sentence.format(**numbers)
@@ -220,39 +221,17 @@ def classify(
     >>> str(saltus.classify(system, theta=0.3).kind)
     'periodic'
     """
-    clock, start = with_clock(system), _start(system, velocity, coordinates)
+    clock, start = with_clock(system), read_start(system, velocity, coordinates, NAMES)
     check_count("periods", periods, 2 * LYAPUNOV.batches)
     check_count("transient", transient, 0)
     check_count("max_period", max_period, RECURRENCE.compiled_max_period)
     check_count("seed", seed, 0)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     case = _Case(system, clock, int(periods), int(max_period), int(seed), float(tol), progress)
-    ends = case.ends_of(start[0], int(transient + periods), (0.0, 0.3))
-    verdict = _settled(case, ends, start[0]) or _judged(case, ends)
+    ends = case.ends_of(start, int(transient + periods), (0.0, 0.3))
+    verdict = _settled(case, ends, start) or _judged(case, ends)
     progress(1.0, "verdict")
     return verdict
-
-
-def _start(system: System, velocity: Any, coordinates: dict[str, float]) -> np.ndarray:
-    """The state at the start as a row.
-
-    Raises
-    ------
-    ParameterError
-        Names of other coordinates, or values that are no numbers.
-    """
-    names = system.model.coordinates
-    if set(coordinates) != set(names):
-        wanted, given = ", ".join(f"{name}=..." for name in names), ", ".join(coordinates) or "no coordinate"
-        raise ParameterError(f"the state at the start is {wanted} and velocity=..., got {given}", "coordinates")
-    velocities = [velocity] * len(names) if np.ndim(velocity) == 0 else list(velocity)
-    if len(velocities) != len(names):
-        raise ParameterError(f"velocity must have {len(names)} value(s), got {velocity!r}", "velocity")
-    for name in names:
-        check_number(name, coordinates[name])
-    for value in velocities:
-        check_number("velocity", value)
-    return np.array([[*(coordinates[name] for name in names), *velocities]], dtype=float)
 
 
 def _settled(case: _Case, ends: Recurrence, start: np.ndarray) -> Verdict | None:
@@ -261,7 +240,7 @@ def _settled(case: _Case, ends: Recurrence, start: np.ndarray) -> Verdict | None
         held, numbers = case.system.model.holds_coordinates, {"periods": round(float(ends.periods[0]))}
         point = ends.last[0] if held else np.array([float(case.system.model.contact), 0.0])
         cause = Reason.STANDS if case.system.model.frictions else Reason.CAPTURED
-        return case.verdict(Ending.REST, cause, ends, numbers, state=start_at(case.system, point))
+        return case.verdict(Ending.REST, cause, ends, numbers, state=arguments_of(case.system, point))
     if ends.ended[0]:
         return _ended(case, ends, start)
     if not ends.periodic[0]:
@@ -275,7 +254,7 @@ def _ended(case: _Case, ends: Recurrence, start: np.ndarray) -> Verdict:
     """The verdict on a motion that cannot be followed further; `simulate` gives the reason."""
     periods = round(float(ends.periods[0]))
     try:
-        motion = simulate(case.clock, **start_at(case.system, start), periods=periods + 1, tol=case.tol, dense=False)
+        motion = simulate(case.clock, **arguments_of(case.system, start), periods=periods + 1, tol=case.tol, dense=False)
     except MotionError as error:
         return case.undecided(Reason.CANNOT_GO_ON, ends, {"error": error})
     if motion.limit is not None:
@@ -336,7 +315,7 @@ def _witnesses(case: _Case, ends: Recurrence) -> dict[str, Any]:
     series = ends.states[0, :, 0]
     series = series[np.isfinite(series)]
     run: dict[str, Any] = {"periods": case.periods, "transient": 0, "tol": case.tol, "two_trajectories": False}
-    start = start_at(case.system, ends.states[0, -1])
+    start = arguments_of(case.system, ends.states[0, -1])
     exponents = lyapunov_spectrum(case.system, **start, **run, progress=part_of(case.progress, 0.7, 1.0))
     opinion = zero_one_of_bands(series, seed=case.seed) if series.size >= FEWEST_ENTRIES else None
     return {"exponents": exponents, "zero_one": opinion}

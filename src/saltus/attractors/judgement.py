@@ -15,9 +15,8 @@ from saltus.attractors.lyapunov.growth import LargestExponents
 from saltus.attractors.reason import Reason
 from saltus.attractors.tori import regular_motion
 from saltus.flow import RECURRENCE, Ending, Recurrence, find_recurrence, return_period
-from saltus.orbits import states_beside
 from saltus.progress import Progress, part_of, silent
-from saltus.systems import System
+from saltus.systems import System, states_beside
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ import numpy as np
 from saltus.attractors.stroboscopic_section import section_states
 from saltus.errors import MotionError
 from saltus.flow import EventKind, Stop, nearest_return, simulate
-from saltus.orbits import PeriodicOrbit, Signature, equations_of, orbit_from, start_at
-from saltus.systems import System
+from saltus.orbits import PeriodicOrbit, Signature, equations_of, orbit_from
+from saltus.systems import System, arguments_of
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def certify(system: System, state: np.ndarray, period: int | None, max_period: i
 def solved_orbit(system: System, state: np.ndarray, period: int, admissible: bool = True) -> PeriodicOrbit | None:
     """The orbit of this period near a motion from a state (d,) at phase 0; None if Newton's method finds none."""
     try:
-        orbit = orbit_from(equations_of(system, Signature((), 1)), start_at(system, state), period)
+        orbit = orbit_from(equations_of(system, Signature((), 1)), arguments_of(system, state), period)
     except MotionError:
         return None
     return orbit if orbit is not None and (orbit.admissible or not admissible) else None
@@ -107,6 +107,6 @@ def stays_at_rest(system: System, state: np.ndarray) -> bool:
     """Whether contacts or frictions hold a state (d,) at rest over a whole forcing period; it then stays, as the load repeats."""
     if not system.model.holds_coordinates:
         return False
-    motion = simulate(system, **start_at(system, state), periods=1, dense=False)
+    motion = simulate(system, **arguments_of(system, state), periods=1, dense=False)
     lets_go = (EventKind.IMPACT, EventKind.RELEASE, EventKind.SLIP)
     return motion.stop is Stop.REST and not any(event.kind in lets_go for event in motion.events)

@@ -12,17 +12,6 @@ from .equations.resting import RestingOrbit
 from .finding.from_motion import find_orbit, orbit_from
 from .finding.near_returns import orbits_near_returns, solved_near
 from .finding.search import Search, search_orbits
-from .finding.starts import (
-    before_impacts,
-    even_steps,
-    initial_states,
-    is_still,
-    rest_state,
-    start_at,
-    state_vector,
-    states_beside,
-    within_window,
-)
 from .free_orbits import FreeOrbit, FreeOutcome, backbone, free_orbit
 from .orbit import PeriodicOrbit, solve
 from .orbits_as_json import as_json, from_json
@@ -47,7 +36,6 @@ __all__ = [
     "SpecialPoint",
     "as_json",
     "backbone",
-    "before_impacts",
     "closing_distances",
     "closing_rows",
     "continue_orbit",
@@ -55,28 +43,20 @@ __all__ = [
     "defects",
     "doubling_cascade",
     "equations_of",
-    "even_steps",
     "find_orbit",
     "follow_stable",
     "free_orbit",
     "from_json",
-    "initial_states",
-    "is_still",
     "is_symmetric",
     "keeps_symmetry",
     "mean_dissipated_power",
     "orbit_from",
     "orbits_near_returns",
     "orbits_of",
-    "rest_state",
     "same_orbit",
     "search_orbits",
     "solve",
     "solved_near",
-    "start_at",
-    "state_vector",
-    "states_beside",
     "switch_branch",
     "transmissibility",
-    "within_window",
 ]

@@ -12,12 +12,10 @@ from saltus.attractors import Equilibrium, Separatrix, equilibria, separatrices
 from saltus.checks import check_count, check_number, check_states
 from saltus.errors import ParameterError
 from saltus.flow import simulate
-from saltus.orbits import even_steps
 from saltus.progress import Progress, silent
 from saltus.provenance import provenance
 from saltus.public_functions import checked_by
-from saltus.systems import System, VelocityReduction
-from saltus.window import Box, check_window
+from saltus.systems import Box, System, VelocityReduction, check_window, even_steps
 
 if TYPE_CHECKING:
     import xarray

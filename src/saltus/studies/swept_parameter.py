@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_along, check_axis, check_count, check_number, check_path
+from saltus.checks import check_axis, check_count, check_number
 from saltus.errors import ParameterError
 from saltus.flow import Ending, Recurrence, find_recurrence, rate_name
 from saltus.progress import Progress, silent
 from saltus.provenance import provenance
 from saltus.public_functions import checked_by
-from saltus.systems import System, check_system
+from saltus.systems import System, check_along, check_path, check_system, read_start
 
 if TYPE_CHECKING:
     import xarray
@@ -74,20 +74,7 @@ class SweepRequest:
         check_count("max_period", self.max_period, 1)
         check_number("tol", self.tol, at_least=1e-15, at_most=1e-6)
         object.__setattr__(self, "grid", grid)
-        object.__setattr__(self, "start", self._start())
-
-    def _start(self) -> np.ndarray:
-        names = self.system.model.coordinates
-        for name in self.coordinates:
-            if name not in names:
-                raise ParameterError(f"{type(self.system.model).__name__} has no coordinate {name!r}", name)
-        speeds = np.atleast_1d(np.asarray(self.velocity, dtype=float))
-        if speeds.shape not in ((1,), (len(names),)) or (len(names) > 1 and speeds.any() and speeds.size == 1):
-            raise ParameterError(f"velocity must be {len(names)} numbers, got {self.velocity!r}", "velocity")
-        position = [self.coordinates.get(name, 0.0) for name in names]
-        for name, value in zip((*names, "velocity"), (*position, float(speeds[0])), strict=True):
-            check_number(name, value)
-        return np.concatenate([position, np.broadcast_to(speeds, len(names))])
+        object.__setattr__(self, "start", read_start(self.system, self.velocity, self.coordinates, self.__dataclass_fields__))
 
     def end_at_value(self, value: float, state: np.ndarray) -> Recurrence:
         """What becomes of a state at phase 0 at one value of the parameter."""
@@ -156,7 +143,7 @@ def frequency_sweep(
     max_period
         The longest period looked for.
     velocity, coordinates
-        The state at the first value, at phase 0; 0 where it is not given.
+        The state at the first value, at phase 0.
     tol
         The error that one step of the integration may make.
     progress

@@ -26,7 +26,15 @@ from .metainterface import Metainterface
 from .mirror import contact_images, image_of
 from .model import MarginKind, Model
 from .one_contact_model import OneContactModel
-from .parameter_tables import broadcast_arrays, check_parameters, distinct_rows, finite_array, parameter_table
+from .parameter_tables import (
+    broadcast_arrays,
+    check_along,
+    check_parameters,
+    check_path,
+    distinct_rows,
+    finite_array,
+    parameter_table,
+)
 from .parameters import children, is_number, numbers, substitute
 from .pulse import Pulse
 from .pulses import Chirp, HalfSine, MavroeidisPapageorgiou, OneCosine, OneSine, Ramp, Ricker
@@ -37,16 +45,31 @@ from .scenarios import LayerState, NamedImpact, Scenario, TableRow, name_impact,
 from .serial import signal_class
 from .si_units import PhysicalCell
 from .signals import Constant, Harmonic, Record, Signal, Sum
+from .start_state import arguments_of, read_start, read_starts, state_of
+from .states import (
+    before_impacts,
+    check_reached,
+    even_steps,
+    held_by_contacts,
+    initial_states,
+    is_still,
+    on_this_side,
+    rest_state,
+    states_beside,
+    within_window,
+)
 from .system import System, check_system
 from .two_layer import TwoLayer
 from .two_stops import TwoStops
 from .unit_cell import UnitCell
 from .wall_oscillator import WallOscillator
+from .window import Box, Window, check_window
 
 __all__ = [
     "IMPACTS",
     "MODELS",
     "BeltOscillator",
+    "Box",
     "CellChain",
     "CellLayout",
     "Channel",
@@ -92,30 +115,48 @@ __all__ = [
     "UnitCell",
     "VelocityReduction",
     "WallOscillator",
+    "Window",
     "apart",
+    "arguments_of",
+    "before_impacts",
     "broadcast_arrays",
+    "check_along",
     "check_parameters",
+    "check_path",
+    "check_reached",
     "check_system",
+    "check_window",
     "children",
     "constrained_acceleration",
     "contact_images",
     "distinct_rows",
     "energy_gain",
     "energy_gains",
+    "even_steps",
     "finite_array",
+    "held_by_contacts",
     "image_of",
+    "initial_states",
     "is_number",
+    "is_still",
     "mass_and_force",
     "name_impact",
     "normal_forces",
     "numbers",
+    "on_this_side",
     "other_impulse",
     "parameter_table",
     "reactions",
+    "read_start",
+    "read_starts",
     "register",
+    "rest_state",
     "reversed_system",
     "signal_class",
+    "state_of",
+    "states_beside",
     "stick_margins",
     "substitute",
     "table_1",
+    "within_window",
 ]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 import math
-from functools import cache
 from types import FunctionType
 from typing import Any
 
@@ -34,21 +33,21 @@ def check_works(model: Model) -> None:
     ParameterError
         The error names the class and what is wrong.
     """
-    _check_class(type(model))
+    if type(model) not in _known:
+        _check_class(type(model))
     if isinstance(model, OneContactModel):
         check_one_contact(model)
     if isinstance(model, ContactModel):
         check_contact_model(model)
-    if type(model) not in _probed:
+    if type(model) not in _known:
         _probe(model)
-        _probed.add(type(model))
+        _known.add(type(model))
 
 
-_probed = set[type[Model]]()  # classes of which one model has answered, as systems are made by the thousand
+_known = set[type[Model]]()  # classes of which one model has passed, as systems are made by the thousand
 
 
-@cache
-def _check_class(kind: Any) -> None:
+def _check_class(kind: type[Model]) -> None:
     """Refuse a class that lacks its equation of motion, or has parts that only another class of models has."""
     for base, parts in OWN_PARTS.items():
         given = [name for name in parts if getattr(kind, name, ()) not in ((), getattr(Model, name, None))]

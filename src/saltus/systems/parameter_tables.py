@@ -146,3 +146,35 @@ def _coords(named: dict[str, Any], dims: tuple[str, ...]) -> dict[str, Any]:
         if array.dims in ((name,), (f"initial_{name}",)):
             coords.setdefault(str(array.dims[0]), array.copy().assign_coords({array.dims[0]: array.values}))
     return {name: values.reset_coords(drop=True) for name, values in coords.items() if name not in unlike}
+
+
+def check_path(system: System, path: Any, name: str = "path") -> None:
+    """Refuse anything but the dotted path of a number of the system.
+
+    Raises
+    ------
+    ParameterError
+        The error is of the argument `name` and gives similar paths.
+    """
+    if isinstance(path, str) and path in system.parameters:
+        return
+    try:
+        system.get(path)
+    except ParameterError as error:
+        raise ParameterError(str(error), name) from None
+    raise ParameterError(f"{path} is not a number, so nothing can be computed along it", name)
+
+
+def check_along(system: System, path: str, values: Iterable[float], name: str) -> None:
+    """Refuse values of the parameter at `path` that the system does not allow.
+
+    Raises
+    ------
+    ParameterError
+        The error is of the argument `name` and has the system's refusal.
+    """
+    for value in values:
+        try:
+            system.with_({path: float(value)})
+        except ParameterError as error:
+            raise ParameterError(f"{name} reach beyond what the system allows: {error}", name) from None

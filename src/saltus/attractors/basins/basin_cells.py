@@ -14,10 +14,9 @@ from saltus.attractors.attractor import LAST_STATES, SAME_STATE, UNDECIDED, Targ
 from saltus.attractors.stroboscopic_section import with_clock
 from saltus.errors import ParameterError
 from saltus.flow import Ending, Recurrence, find_recurrence
-from saltus.orbits import before_impacts
 from saltus.progress import Progress, silent
 from saltus.provenance import check_provenance, identity, provenance
-from saltus.systems import System
+from saltus.systems import System, before_impacts
 
 if TYPE_CHECKING:
     from saltus.sweep import Plan

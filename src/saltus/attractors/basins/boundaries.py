@@ -19,8 +19,7 @@ from saltus.attractors.manifolds.saddle_manifolds import is_saddle, stable_manif
 from saltus.attractors.orbit_certificate import solved_orbit
 from saltus.attractors.stroboscopic_section import is_constant, section_states
 from saltus.orbits import PeriodicOrbit, is_symmetric, same_orbit
-from saltus.systems import System, image_of
-from saltus.window import Window, check_window
+from saltus.systems import System, Window, check_window, image_of
 
 
 @dataclass(frozen=True)

@@ -28,22 +28,12 @@ from saltus.attractors.attractor_search import find_attractors
 from saltus.attractors.basins.basin_cells import Grid, Labelling, check_basin_store, computed_cells
 from saltus.attractors.basins.boundaries import basin_boundaries
 from saltus.attractors.stroboscopic_section import with_clock
-from saltus.checks import (
-    LIMITS,
-    check_axis,
-    check_count,
-    check_memory,
-    check_number,
-    check_reached,
-    check_work,
-)
+from saltus.checks import LIMITS, check_axis, check_count, check_memory, check_number, check_work
 from saltus.errors import ParameterError
 from saltus.flow import state_names
-from saltus.orbits import rest_state
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import checked_by
-from saltus.systems import System, check_system, reversed_system
-from saltus.window import Window, check_window
+from saltus.systems import System, Window, check_reached, check_system, check_window, rest_state, reversed_system
 
 if TYPE_CHECKING:
     import xarray

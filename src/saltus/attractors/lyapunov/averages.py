@@ -10,7 +10,6 @@ import numpy as np
 
 from saltus.attractors.stroboscopic_section import check_periodic
 from saltus.checks import check_count, check_number
-from saltus.flow import Motion
 from saltus.systems import System, check_system
 
 
@@ -159,9 +158,3 @@ def first_frame(size: int) -> np.ndarray:
     """
     frame: np.ndarray = np.linalg.qr(np.random.default_rng(0).standard_normal((size, size)))[0]
     return frame
-
-
-def state_of(motion: Motion) -> dict[str, Any]:
-    """The state at the end of a motion, as `simulate` takes it."""
-    names = motion.system.model.coordinates
-    return {**dict(zip(names, np.atleast_1d(motion.position).tolist(), strict=True)), "velocity": motion.velocity}

@@ -17,8 +17,7 @@ from scipy.special import stdtrit
 
 from saltus.attractors.lyapunov.averages import LYAPUNOV, resolution
 from saltus.flow import Stop, ensemble_from
-from saltus.orbits import states_beside
-from saltus.systems import System
+from saltus.systems import System, states_beside
 
 
 class Perturbations(ABC):

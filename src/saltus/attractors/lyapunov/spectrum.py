@@ -18,16 +18,14 @@ from saltus.attractors.lyapunov.averages import (
     period_length,
     resolution,
     span_count,
-    state_of,
     uncertainty,
 )
 from saltus.bounds import Interval, Leaves, enclose, reads
 from saltus.flow import EventKind, Motion, Stop, sensitivities, simulate
-from saltus.orbits import states_beside
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import Numbers
 from saltus.result import Result, result_dataset
-from saltus.systems import System
+from saltus.systems import System, arguments_of, states_beside
 from saltus.taylor import Expr, differentiate, substitute, trace
 
 if TYPE_CHECKING:
@@ -109,16 +107,14 @@ def _middle(bounds: Interval) -> np.ndarray:
     return middle
 
 
-def separation_growth(
-    system: System, state: dict[str, Any], periods: int, length: float, progress: Progress = silent
-) -> np.ndarray:
+def separation_growth(system: System, state: np.ndarray, periods: int, length: float, progress: Progress = silent) -> np.ndarray:
     """ln(distance after a period / distance before) for each period, (periods,); -inf once both states are the same.
 
     After each period the second state is moved along the line to the first one, back to the distance of 1e-7 (Benettin, Galgani,
     Giorgilli and Strelcyn, Meccanica 15 (1980) 9). The two may lie on different sides of the contact, or have different numbers
     of impacts. Of several contacts, those that are closed in the first state are closed in the second.
     """
-    here = _vector(state)
+    here = state
     away = np.full(here.size, LYAPUNOV.distance / np.sqrt(here.size))
     growth = np.full(periods, -np.inf)
     for p in range(periods):
@@ -135,18 +131,10 @@ def separation_growth(
     return growth
 
 
-def _vector(state: dict[str, Any]) -> np.ndarray:
-    """Coordinates, then velocities."""
-    return np.concatenate([np.atleast_1d(values) for values in state.values()]).astype(float)
-
-
 def _mapped(system: System, state: np.ndarray, length: float) -> np.ndarray:
     """The state a period later."""
-    names = system.model.coordinates
-    velocity = state[len(names) :].tolist()
-    start: dict[str, Any] = dict(zip(names, state[: len(names)].tolist(), strict=True))
-    start["velocity"] = velocity[0] if len(names) == 1 else tuple(velocity)
-    return _vector(state_of(simulate(system, **start, duration=length, tol=LYAPUNOV.tolerance, dense=False)))
+    start = arguments_of(system, state)
+    return simulate(system, **start, duration=length, tol=LYAPUNOV.tolerance, dense=False).final_state
 
 
 @dataclass(frozen=True, eq=False)
@@ -309,12 +297,12 @@ def lyapunov_spectrum(
     check_run("lyapunov_spectrum", system, periods, transient, tol)
     run, start = _Run(system, periods), dict[str, Any](coordinates, velocity=velocity)
     motion = simulate(system, **start, duration=transient * run.length, tol=tol, dense=False)
-    run.state, run.note = state_of(motion), _lost(motion)
+    run.state, run.note = arguments_of(system, motion.final_state), _lost(motion)
     share = 0.6 if two_trajectories else 1.0
     run.stretch_frames(tol, part_of(progress, 0.0, share))
     growth = np.full(LYAPUNOV.batches, np.nan)
     if two_trajectories and run.note is None:
-        growth = separation_growth(system, state_of(motion), periods, run.length, part_of(progress, share, 1.0))
+        growth = separation_growth(system, motion.final_state, periods, run.length, part_of(progress, share, 1.0))
     progress(1.0, "exponents")
     return run.exponents(growth)
 
@@ -363,7 +351,7 @@ class _Run:
             self.stretch[p] += np.log(lengths)
         self.areas[p] += contraction.along(found.motion)
         self.condition = max(self.condition, float(np.linalg.cond(found.state)))
-        self.state = state_of(found.motion)
+        self.state = arguments_of(self.system, found.motion.final_state)
         return np.asarray(frame)
 
     def exponents(self, growth: np.ndarray) -> Exponents:

@@ -21,8 +21,7 @@ from saltus.checks import check_number
 from saltus.errors import ParameterError
 from saltus.flow import Motion, simulate
 from saltus.result import Result, result_dataset
-from saltus.systems import Constant, System, check_system, reversed_system
-from saltus.window import Box, Window, check_window
+from saltus.systems import Box, Constant, System, Window, check_system, check_window, reversed_system
 
 if TYPE_CHECKING:
     import xarray

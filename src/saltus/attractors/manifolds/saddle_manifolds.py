@@ -24,11 +24,10 @@ from saltus.attractors.stroboscopic_section import section_states
 from saltus.checks import check_count, check_number
 from saltus.errors import MotionError, ParameterError
 from saltus.flow import last_states, motions_from, sensitivities
-from saltus.orbits import PeriodicOrbit, start_at
+from saltus.orbits import PeriodicOrbit
 from saltus.public_functions import answered
 from saltus.result import Result, result_dataset
-from saltus.systems import System, reversed_system
-from saltus.window import Box, Window, check_window
+from saltus.systems import Box, System, Window, arguments_of, check_window, reversed_system
 
 if TYPE_CHECKING:
     import xarray
@@ -351,7 +350,7 @@ def _directions(system: System, states: np.ndarray, stable: bool) -> tuple[float
     """The multiplier and the unit vector along the manifold at each state of the orbit, carried on by the map's derivative."""
     maps = []
     for state in states:
-        found = sensitivities(system, **start_at(system, state), periods=1, tol=MANIFOLDS.tolerance, dense=False)
+        found = sensitivities(system, **arguments_of(system, state), periods=1, tol=MANIFOLDS.tolerance, dense=False)
         if found.undefined:
             raise MotionError(f"the orbit's map has no derivative at phase 0: {found.undefined}")
         maps.append(found.state)

@@ -13,8 +13,8 @@ from saltus.checks import LIMITS, check_memory
 from saltus.errors import ParameterError
 from saltus.flow.lanes.ensemble_dataset import result_names
 from saltus.flow.motion.dataset import rate_name
-from saltus.flow.motion.request import check_coordinates
-from saltus.systems import System, broadcast_arrays, check_parameters, finite_array, numbers, parameter_table
+from saltus.flow.motion.request import ARGUMENTS
+from saltus.systems import System, broadcast_arrays, check_parameters, finite_array, numbers, parameter_table, read_starts
 
 
 @dataclass(frozen=True)
@@ -60,11 +60,8 @@ def read_inputs(system: System, velocity: Any, time: Any, parameters: Any, coord
 def _starts(system: System, velocity: Any, time: Any, coordinates: Mapping[str, Any]) -> dict[str, Any]:
     """The state and the time at the start, by name."""
     names = system.model.coordinates
-    check_coordinates(system, coordinates)
-    speeds = (velocity,) if len(names) == 1 else velocity
-    if not isinstance(speeds, (tuple, list)) or len(speeds) != len(names):
-        raise ParameterError(f"velocity must be a tuple of {len(names)} numbers or arrays, got {velocity!r}", "velocity")
-    starts = {name: coordinates[name] for name in names}
+    positions, speeds = read_starts(system, velocity, coordinates, ARGUMENTS)
+    starts = dict(zip(names, positions, strict=True))
     starts |= {rate_name(name, names): speed for name, speed in zip(names, speeds, strict=True)}
     return starts | {"time": time}
 

@@ -253,6 +253,11 @@ class Motion(Result):
         return f"Motion(time={self.time:.12g}, {state}, velocity={self.velocity}, impacts={len(self.impacts)}, stop={where})"
 
     @property
+    def final_state(self) -> np.ndarray:
+        """The state at the end, coordinates and then velocities, (d,)."""
+        return np.append(self.position, self.velocity)
+
+    @property
     def closed(self) -> tuple[str, ...]:
         """The contacts that are closed at the end, of a model with several."""
         return tuple(contact.name for i, contact in enumerate(self.system.model.contacts) if (self.side - 1) >> i & 1)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from saltus.checks import check_along, check_bounds, check_path, check_step
+from saltus.checks import check_bounds, check_step
 from saltus.continuation import STEPS, Continuation, End, Watch, both_ways
 from saltus.errors import ParameterError, shown
 from saltus.orbits.branches.branch import START, Branch
@@ -22,6 +22,7 @@ from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
 from saltus.orbits.symmetry import keeps_symmetry
 from saltus.progress import Progress, silent
+from saltus.systems import check_along, check_path
 
 STEP = STEPS.longest  # the longest step: a thirtieth of the parameter's range, or a tenth of a radian and of a unit of speed
 # To a nearby value of the parameter a single step may go all the way, and change phases and speeds by 1.

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import check_bounds, check_count, check_path, check_step
+from saltus.checks import check_bounds, check_count, check_step
 from saltus.continuation import STEPS, Continuation, Cut, End, TestFunction, both_ways
 from saltus.errors import ParameterError
 from saltus.orbits.branches.branch_continuation import STEP
@@ -25,7 +25,7 @@ from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.symmetry import keeps_symmetry
 from saltus.orbits.tolerances import TOLERANCES
 from saltus.progress import Progress, silent
-from saltus.systems import check_system
+from saltus.systems import check_path, check_system
 
 FOLLOWED = (SpecialKind.LP, SpecialKind.PD, SpecialKind.BPC, SpecialKind.GR)
 TENFOLD = 10.0  # a parameter without bounds is followed up to its value times this, and down to its value divided by this

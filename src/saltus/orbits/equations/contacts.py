@@ -36,10 +36,9 @@ from saltus.orbits.branches.orbit_curve import OrbitPoint
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind
 from saltus.orbits.equations.contract import MotionToRead, OrbitEquations, OrbitEvaluation, Solution
 from saltus.orbits.equations.read_events import STAYS, read_signature
-from saltus.orbits.finding.starts import start_at
 from saltus.orbits.signature import ModeChange, Signature
 from saltus.orbits.tolerances import TOLERANCES
-from saltus.systems import System, image_of
+from saltus.systems import System, arguments_of, image_of
 from saltus.taylor import FREQUENCY
 
 AFTER_IMPACT = 2  # power of the time with which the gap grows after an impact with e = 0; after a release it is `AFTER_RELEASE`
@@ -281,14 +280,14 @@ class ContactsEquations(OrbitEquations):
         state, phases = self.split(solution.unknowns)
         values, system = solution.values, self.at(solution.values)
         if not phases.size:
-            return {**start_at(system, self._with_held(state, self.signature.closed, values)), "time": 0.0}
+            return {**arguments_of(system, self._with_held(state, self.signature.closed, values)), "time": 0.0}
         times = np.append(phases, phases[0] + self.closing) / self.frequency(values)
         longest = int(np.argmax(np.diff(times)))
         begin = solution.evaluation.ends[longest, SegmentEnd.NUMBERS : SegmentEnd.NUMBERS + 2 * self.own]
         part = times[longest] + np.array([0.0, START_SHARE]) * (times[longest + 1] - times[longest])
         there = self.carried_along(begin, int(self.plan[longest, SegmentPlan.ALONG]), part, values)
         assert there is not None, "an orbit's own segments can be followed"
-        return {**start_at(system, there), "time": float(part[1])}
+        return {**arguments_of(system, there), "time": float(part[1])}
 
     def halves(self, solution: Solution, mirrored: bool) -> np.ndarray | None:
         signature, unknowns = self.signature, solution.unknowns

@@ -29,10 +29,9 @@ from saltus.orbits.branches.codimension import room
 from saltus.orbits.branches.orbit_curve import OrbitPoint
 from saltus.orbits.branches.special_point import SpecialKind
 from saltus.orbits.equations.contract import MotionToRead, OrbitEquations, OrbitEvaluation, Solution
-from saltus.orbits.finding.starts import start_at, state_vector
 from saltus.orbits.signature import Signature
 from saltus.orbits.tolerances import TOLERANCES
-from saltus.systems import System
+from saltus.systems import System, arguments_of, state_of
 from saltus.taylor import FREQUENCY
 
 
@@ -68,13 +67,13 @@ class OneContactEquations(OrbitEquations):
         if once.side == 0 or len(once.events.of(EventKind.REST)) or not once.phase_known:
             return None
         if base.passes_contact:
-            return base.with_signature(Signature((), periods)), state_vector(base.system, motion.state)
+            return base.with_signature(Signature((), periods)), state_of(base.system, motion.state)
         impacts = once.impacts
         # with two sides the number of impacts is even: an impact near the section may have been counted twice, or not at all
         count = len(impacts) - (len(impacts) % 2 if len(base.system.model.sides) == 2 else 0)
         if not count:
             signature = Signature((), periods, False, once.side)
-            return base.with_signature(signature), state_vector(base.system, motion.state)
+            return base.with_signature(signature), state_of(base.system, motion.state)
         rate = np.abs(impacts.velocity_before[:count])
         sides = tuple(int(s) for s in impacts.side[:count])
         unknowns = np.stack([impacts.time[:count] * base.frequency(base.values), rate], axis=1).ravel()
@@ -97,7 +96,7 @@ class OneContactEquations(OrbitEquations):
         """Just after the first impact or, without impacts, at phase 0."""
         system = self.at(solution.values)
         if not self.signature.sides:
-            return start_at(system, solution.unknowns)
+            return arguments_of(system, solution.unknowns)
         model, side, frequency = system.one_contact, self.signature.sides[0], self.frequency(solution.values)
         phase, speed = solution.unknowns[:2]
         time = float((phase - 2.0 * math.pi * math.floor(phase / (2.0 * math.pi))) / frequency)

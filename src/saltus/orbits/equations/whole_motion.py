@@ -48,10 +48,9 @@ from saltus.orbits.equations.contract import MotionToRead, OrbitEquations, Orbit
 from saltus.orbits.equations.event_sequence import EventSequence, sequence_of
 from saltus.orbits.equations.read_events import STAYS, section_of
 from saltus.orbits.equations.sampled_motion import SampledMotion
-from saltus.orbits.finding.starts import start_at
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
-from saltus.systems import System, image_of
+from saltus.systems import System, arguments_of, image_of
 from saltus.taylor import FREQUENCY
 
 DYING = 1e-5  # Slower impacts are not listed: they belong to an accumulation.
@@ -103,7 +102,7 @@ class WholeMotionEquations(OrbitEquations):
         """At the section."""
         system = self.at(solution.values)
         time = float(self.signature.section or 0.0) / self.frequency(solution.values)
-        return {**start_at(system, self.start_state(solution.unknowns, system)), "time": time}
+        return {**arguments_of(system, self.start_state(solution.unknowns, system)), "time": time}
 
     def impacts(self, solution: Solution) -> tuple[np.ndarray, np.ndarray]:
         times, speeds = solution.evaluation.ends[:, 0], solution.evaluation.ends[:, 1]

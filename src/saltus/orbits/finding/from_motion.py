@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from saltus.checks import check_count, check_names, check_path
-from saltus.errors import MotionError, ParameterError, near, shown
+from saltus.checks import check_count, check_names
+from saltus.errors import MotionError
 from saltus.flow import (
     RECURRENCE,
     Motion,
@@ -23,12 +23,11 @@ from saltus.orbits.branches.images import divide, half
 from saltus.orbits.equations.contract import MotionToRead, OrbitEquations
 from saltus.orbits.equations.kinds import KINDS, equations_of
 from saltus.orbits.equations.resting import resting_near
-from saltus.orbits.finding.starts import start_at, state_vector
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
 from saltus.orbits.symmetry import is_symmetric, keeps_symmetry
 from saltus.public_functions import Numbers
-from saltus.systems import System, check_system
+from saltus.systems import System, arguments_of, check_path, check_system, read_start, state_of
 
 
 @dataclass(frozen=True)
@@ -87,9 +86,10 @@ def find_orbit(
     >>> saltus.find_orbit(system, theta=0.3).signature.impact_count
     2
     """
-    _check(system, parameters, coordinates, {"period": period, "max_period": max_period, "settle": settle})
+    counts = {"period": period, "max_period": max_period, "settle": settle}
+    _check(system, parameters, counts)
+    state = arguments_of(system, read_start(system, velocity, coordinates, ("parameters", *counts)))
     base = equations_of(system, Signature((), 1), tuple(parameters))  # refuses systems that have no orbits
-    state = {**coordinates, "velocity": velocity}
     if settle is not None:
         state = _after(system, state, settle)
         return _polish(base, state, _period_of(system, state, period, max_period), None)
@@ -107,17 +107,12 @@ def find_orbit(
     )
 
 
-def _check(system: System, parameters: Iterable[str], coordinates: Mapping[str, Any], counts: dict[str, int | None]) -> None:
+def _check(system: System, parameters: Iterable[str], counts: dict[str, int | None]) -> None:
     """Refuse arguments without meaning."""
     check_system(system, "find_orbit", several_contacts=True)
     for name, count in counts.items():
         if count is not None or name == "max_period":
             check_count(name, count, 0 if name == "settle" else 1)
-    names = system.model.coordinates
-    for name in coordinates:
-        if name not in names:
-            hint = near(name, names, ("velocity", "parameters", *counts))
-            raise ParameterError(f"{type(system.model).__name__} has no coordinate {shown(name)}; {hint}", name)
     for path in check_names("parameters", parameters, "parameters, such as ('load.frequency',)"):
         check_path(system, path, "parameters")
 
@@ -126,7 +121,7 @@ def _after(system: System, state: dict[str, Any], periods: int) -> dict[str, Any
     """The state `periods` forcing periods later."""
     motion = simulate(system, **state, periods=periods, dense=False)
     _refuse_rest(system, motion, state)
-    return start_at(system, np.append(motion.position, motion.velocity))
+    return arguments_of(system, motion.final_state)
 
 
 def _refuse_rest(system: System, motion: Motion, state: dict[str, Any]) -> None:
@@ -158,10 +153,10 @@ def _refuse_rest(system: System, motion: Motion, state: dict[str, Any]) -> None:
 
 def _stroboscopic_states(system: System, state: dict[str, Any], count: int) -> np.ndarray:
     """The states after 0, 1, ..., count forcing periods."""
-    states = [state_vector(system, state)]
+    states = [state_of(system, state)]
     for _ in range(count):
         state = _after(system, state, 1)
-        states.append(state_vector(system, state))
+        states.append(state_of(system, state))
     return np.array(states)
 
 

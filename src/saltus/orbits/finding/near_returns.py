@@ -15,11 +15,10 @@ from saltus.errors import MotionError
 from saltus.flow import RECURRENCE, last_states, motions_from
 from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.finding.from_motion import orbit_from
-from saltus.orbits.finding.starts import held_by_contacts, on_this_side, start_at, states_beside
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
 from saltus.orbits.verify import same_orbit
-from saltus.systems import System
+from saltus.systems import System, arguments_of, held_by_contacts, on_this_side, states_beside
 
 
 @dataclass(frozen=True)
@@ -82,7 +81,7 @@ def orbits_near_returns(
 def solved_near(system: System, path: str, state: np.ndarray, period: int) -> PeriodicOrbit | None:
     """The orbit of a system near a state at phase 0 that nearly repeats itself, to be followed along a parameter; or None."""
     try:
-        start = start_at(system, on_this_side(system, state.copy()))
+        start = arguments_of(system, on_this_side(system, state.copy()))
         orbit = orbit_from(equations_of(system, Signature((), 1), (path,)), start, period)
     except MotionError:
         return None

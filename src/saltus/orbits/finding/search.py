@@ -8,17 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_count, check_path, check_starts
+from saltus.checks import check_count, check_starts
 from saltus.errors import ParameterError
 from saltus.flow import Recurrence, find_recurrence
 from saltus.orbits.finding.near_returns import orbits_near_returns, solved_near
-from saltus.orbits.finding.starts import initial_states, is_still, rest_state
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.verify import same_orbit
 from saltus.progress import Progress, silent
 from saltus.result import Result, result_dataset
-from saltus.systems import System, check_system
-from saltus.window import Box, Window, check_window
+from saltus.systems import Box, System, Window, check_path, check_system, check_window, initial_states, is_still, rest_state
 
 if TYPE_CHECKING:
     import xarray

@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.errors import MotionError, ParameterError
-from saltus.orbits import Branch, SpecialPoint, continue_special, find_orbit, follow_stable, start_at
+from saltus.orbits import Branch, SpecialPoint, continue_special, find_orbit, follow_stable
 from saltus.progress import Progress
 from saltus.provenance import check_provenance, identity
 from saltus.studies.chart.changes import Changes, ChartMotions, Ways, ending_type, trace
 from saltus.studies.chart.motions import ALIKE
-from saltus.systems import System
+from saltus.systems import System, arguments_of
 
 if TYPE_CHECKING:
     import xarray
@@ -271,7 +271,7 @@ def special_point(system: System, paths: Sequence[str], start: Mapping[str, Any]
     """The special point at which a motion ends between two cells, by continuation of its orbit (`start` as in `curve_from`)."""
     here = system.with_(dict(zip(paths, start["place"], strict=True)))
     try:
-        orbit = find_orbit(here, **start_at(system, start["state"]), period=int(start["period"]), settle=0)
+        orbit = find_orbit(here, **arguments_of(system, start["state"]), period=int(start["period"]), settle=0)
         special = stability_loss(follow_stable(orbit, paths[int(start["along"])], float(start["goal"])))
     except (MotionError, ParameterError):
         return None

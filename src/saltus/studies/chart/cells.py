@@ -15,12 +15,10 @@ import numpy as np
 
 from saltus.attractors import JudgementSettings, judge
 from saltus.flow import Ending, Recurrence, approached, find_recurrence
-from saltus.orbits import initial_states, rest_state, states_beside
 from saltus.studies.chart.chart_request import ChartRequest
 from saltus.studies.chart.motions import ALIKE, SIDES, distinct, has_alike, is_alike, motion_type, motions_in, outcomes, table
-from saltus.systems import System
+from saltus.systems import System, Window, initial_states, rest_state, states_beside
 from saltus.theory import amplitude_limits
-from saltus.window import Window
 
 ASKED = 3  # motions of a cell that have not settled, from which the judgement starts at most
 COMPANIONS = 6  # motions that are followed for each cell that is judged

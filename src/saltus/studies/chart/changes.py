@@ -16,9 +16,8 @@ import numpy as np
 
 from saltus.enumerations import NumberedSentence
 from saltus.flow import approached, captured_between, find_recurrence, return_period
-from saltus.orbits import states_beside
 from saltus.studies.chart.motions import ALIKE, SIDES, motion_type, motions_in, read_motions
-from saltus.systems import System
+from saltus.systems import System, states_beside
 
 if TYPE_CHECKING:
     import xarray

@@ -9,25 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import (
-    check_along,
-    check_axis,
-    check_count,
-    check_dataset,
-    check_memory,
-    check_number,
-    check_path,
-    check_starts,
-    check_work,
-)
+from saltus.checks import check_axis, check_count, check_dataset, check_memory, check_number, check_starts, check_work
 from saltus.enumerations import flags
 from saltus.errors import ParameterError, shown
 from saltus.flow import Ending, state_names
 from saltus.provenance import check_provenance, identity, provenance
 from saltus.studies.chart.motions import KEPT, CellOutcome
-from saltus.systems import System, check_system
+from saltus.systems import System, check_along, check_path, check_system, check_window
 from saltus.theory import amplitude_limits
-from saltus.window import check_window
 
 if TYPE_CHECKING:
     from saltus.sweep import Plan, Variable

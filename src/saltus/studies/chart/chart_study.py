@@ -15,9 +15,8 @@ from saltus.studies.chart.borders import with_borders
 from saltus.studies.chart.changes import read_chart
 from saltus.studies.chart.chart_checks import disagreements
 from saltus.studies.chart.chart_request import ChartRequest
-from saltus.systems import System, check_system
+from saltus.systems import Box, System, check_system
 from saltus.theory import quasi_static_border
-from saltus.window import Box
 
 if TYPE_CHECKING:
     import xarray

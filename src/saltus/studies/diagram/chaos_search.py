@@ -19,8 +19,7 @@ from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.effort import EFFORTS, check_diagram, read_effort
 from saltus.studies.diagram.searched_range import JudgementRequest, MotionStarts, SearchedRange, SearchedValue
 from saltus.studies.diagram.simulated import SimulatedMotions, starts_at
-from saltus.systems import System
-from saltus.window import Box, check_window
+from saltus.systems import Box, System, check_window
 
 SLOWER = 0.8  # The share of the rest that is taken as still to be done after each round, as their number is not known before.
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from saltus.attractors import share_interval
 from saltus.flow import motions_from, stroboscopic
-from saltus.orbits import PeriodicOrbit, keeps_symmetry, orbits_near_returns, solved_near, within_window
+from saltus.orbits import PeriodicOrbit, keeps_symmetry, orbits_near_returns, solved_near
 from saltus.progress import Progress, part_of, silent
 from saltus.studies.diagram.bands import Bands, band_origins
 from saltus.studies.diagram.branch_set import BranchSet, PlacedBranch, placed, stable_motions
@@ -20,8 +20,7 @@ from saltus.studies.diagram.diagram_work import DiagramWork, side_by_side
 from saltus.studies.diagram.effort import EffortSettings
 from saltus.studies.diagram.simulated import LONG, AttractorsFound, BranchAssignment, SimulatedMotions, starts_at
 from saltus.studies.diagram.simulated import SETTINGS as SIMULATION
-from saltus.systems import System
-from saltus.window import Window
+from saltus.systems import System, Window, within_window
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,6 @@ from saltus.studies.diagram.effort import EFFORTS, check_diagram, read_effort
 from saltus.studies.diagram.simulated import LONG, BranchAssignment
 from saltus.systems import System
 from saltus.theory import amplitude_limits
-from saltus.window import Box, check_window
 
 if TYPE_CHECKING:
     import xarray

@@ -7,9 +7,9 @@ from enum import StrEnum
 from typing import Any
 
 from saltus.attractors import JUDGEMENT, JudgementSettings
-from saltus.checks import check_along, check_bounds, check_count, check_path, check_starts
+from saltus.checks import check_bounds, check_count, check_starts
 from saltus.errors import ParameterError, near
-from saltus.systems import System, check_system
+from saltus.systems import System, check_along, check_path, check_system
 
 
 def check_diagram(system: System, path: str, bounds: tuple[float, float], **counts: int) -> tuple[float, float]:

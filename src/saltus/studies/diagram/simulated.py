@@ -11,12 +11,10 @@ import numpy as np
 
 from saltus.enumerations import NumberedSentence
 from saltus.flow import Ending, Recurrence, find_recurrence, return_distances
-from saltus.orbits import even_steps, is_still, within_window
 from saltus.progress import Progress, silent
 from saltus.studies.chart.cells import seeds
 from saltus.studies.chart.motions import ALIKE, by_cell, is_alike, is_same, motion_type
-from saltus.systems import System
-from saltus.window import Window
+from saltus.systems import System, Window, even_steps, is_still, within_window
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Initial states that are spread evenly over a window, on the side of the contacts on which the system can be."""
+"""States and the contacts: initial states spread evenly over a window, and which states a system can be in."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from saltus.systems import System
-from saltus.window import Window
+from saltus.errors import ParameterError
+from saltus.systems.model import Model
+from saltus.systems.system import System
+from saltus.systems.window import Window
 
 CLOSED_BELOW = 1e-13  # A contact is closed, up to rounding, if both its gap and its speed are smaller than this.
 
@@ -139,13 +141,19 @@ def _held(system: System, states: np.ndarray, window: Window) -> np.ndarray:
     return states
 
 
-def start_at(system: System, state: np.ndarray) -> dict[str, Any]:
-    """A state (coordinates, velocities) as `simulate` takes it."""
-    names = system.model.coordinates
-    velocities = tuple(map(float, state[len(names) :]))
-    return {**dict(zip(names, map(float, state), strict=False)), "velocity": velocities[0] if len(names) == 1 else velocities}
+def check_reached(model: Model, coordinate: str, values: Any, name: str) -> None:
+    """Refuse values of a coordinate that a contact does not let it reach.
 
-
-def state_vector(system: System, state: dict[str, Any]) -> np.ndarray:
-    """The inverse of `start_at`: coordinates, then velocities, (d,)."""
-    return np.append([state[name] for name in system.model.coordinates], state["velocity"])
+    Raises
+    ------
+    ParameterError
+        The error is of the argument `name` and has the first such value and the contact.
+    """
+    given = np.atleast_1d(values)
+    gaps = {f"the contact {c.name!r}": (c.gap(given), c.position) for c in model.contacts if c.coordinate == coordinate}
+    if model.has_one_contact and coordinate == model.coordinates[0]:
+        gaps["the contact"] = np.where(model.reaches(coordinate, given), 0.0, -1.0), model.contact
+    for contact, (gap, position) in gaps.items():
+        if (beyond := given[np.asarray(gap) < 0.0]).size:
+            where = f"{contact} at {coordinate} = {float(position):g}"
+            raise ParameterError(f"{coordinate} = {beyond[0]:g} lies beyond {where}; leave such values out", name)

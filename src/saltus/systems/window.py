@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from saltus.checks import LIMITS, as_numbers
 from saltus.errors import ParameterError, shown
-
-if TYPE_CHECKING:
-    from saltus.systems import System
+from saltus.systems.system import System
 
 HALF_WIDTH = 1.5  # the half width of the default window: about the size of the motions in the paper
 
