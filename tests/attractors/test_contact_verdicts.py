@@ -110,7 +110,7 @@ def test_an_orbit_whose_impacts_die_away_is_an_orbit():
 @pytest.mark.parametrize(
     ("ask", "words"),
     [
-        (lambda: classify(layers(0.3), theta=0.1), "theta_1=..., theta_2=... and velocity=..., got theta"),
+        (lambda: classify(layers(0.3), theta=0.1), "theta must have 2 values, got 0.1"),
         (lambda: classify(layers(0.3), theta_1=0.1, theta_2=0.0, velocity=(0.1,)), "velocity must have 2 value(s)"),
         (lambda: lyapunov_many(layers(0.3), theta_1=[0.1], theta_2=0.0), "lyapunov_many works on models with one coordinate"),
     ],

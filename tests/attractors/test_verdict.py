@@ -270,7 +270,7 @@ def test_progress_goes_from_nothing_to_all():
         ({"transient": -1}, "transient must"),
         ({"theta": "far"}, "theta must"),
         ({"velocity": math.inf}, "velocity must"),
-        ({"phi": 1.0}, "theta="),
+        ({"phi": 1.0}, "no coordinate 'phi'"),
         ({"system": 3}, "System"),
     ],
 )

@@ -254,7 +254,6 @@ def test_a_massless_hinge_ends_a_motion_of_both_layers_by_name():
         (lambda: layers(e=(0.1, 0.2, 0.3)), "impact.e must have 2 value(s), for lower, upper, got 3"),
         (lambda: layers(e=1.2), "e must lie in [0, 1], got 1.2"),
         (lambda: saltus.simulate(layers(), theta=0.1, duration=1.0), "theta must have 2 values, got 0.1"),
-        (lambda: saltus.simulate_many(layers(), theta_1=0.1, theta_2=0.0, periods=1), "velocity must be a tuple of 2 numbers"),
     ],
 )
 def test_what_has_no_meaning_is_refused_by_name(ask, words):
