@@ -23,7 +23,7 @@ from saltus.studies.diagram.diagram_search import DiagramSearch
 from saltus.studies.diagram.diagram_work import DiagramWork, diagram_plan, diagram_work
 from saltus.studies.diagram.effort import EFFORTS, check_diagram, read_effort
 from saltus.studies.diagram.simulated import LONG, BranchAssignment
-from saltus.systems import System
+from saltus.systems import Box, System, check_window
 from saltus.theory import amplitude_limits
 
 if TYPE_CHECKING:
