@@ -26,9 +26,9 @@ from saltus.orbits.equations.contract import Restart
 from saltus.orbits.equations.event_sequence import SETTINGS as EVENTS
 from saltus.orbits.equations.event_sequence import EventSequence, OrbitEvent
 from saltus.orbits.equations.read_events import section_of
-from saltus.orbits.finding.starts import start_at
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.tolerances import TOLERANCES
+from saltus.systems import arguments_of
 
 Events = tuple[OrbitEvent, ...]
 TINY = float(np.finfo(float).tiny)  # replaces a distance of 0 before a change of events, to keep the test function negative there
@@ -184,7 +184,7 @@ def _as_the_motion_goes_on(point: OrbitPoint) -> Restart:
     of the rest, where grazings accumulate, so that the branch goes on from a little farther ahead."""
     way = point.tangent[-len(point.parameters) :]
     way = way / np.linalg.norm(way / np.array(point.curve.scales))
-    state = start_at(point.orbit.system, point.orbit.section_state)
+    state = arguments_of(point.orbit.system, point.orbit.section_state)
     values = [point.parameters + distance * way for distance in SETTINGS.after_rest]
     return Restart(state, values, End(OrbitEnd.REST_VANISHES, point.parameter))
 

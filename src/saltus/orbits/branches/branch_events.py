@@ -25,9 +25,9 @@ from saltus.orbits.branches.special_point import OrbitEnd, OrbitMissed, SpecialK
 from saltus.orbits.equations.contract import Restart
 from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.finding.from_motion import orbit_from
-from saltus.orbits.finding.starts import start_at
 from saltus.orbits.signature import Signature
 from saltus.orbits.tolerances import TOLERANCES
+from saltus.systems import arguments_of
 
 Run = Continuation
 
@@ -216,7 +216,7 @@ def restarted(restart: Restart, point: OrbitPoint) -> OrbitPoint | End:
         try:
             system = equations.at(values)
             motion = simulate(system, **restart.state, periods=SETTINGS.settling * period, dense=False)
-            state = start_at(system, np.append(motion.position, motion.velocity))
+            state = arguments_of(system, np.append(motion.position, motion.velocity))
             orbit = orbit_from(equations_of(system, Signature((), 1), equations.paths, equations.tol), state, period)
         except SaltusError:
             continue
