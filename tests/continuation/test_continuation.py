@@ -202,7 +202,7 @@ class Root(NaturalCurve[Point]):
     bounds: tuple[float, float] = (-1.0, 1.0)
     scale: float = 1.0
 
-    def at(self, value):
+    def solution_at(self, value):
         return None if value > 0.3 else Point(self, np.array([value]), np.array([self.scale]), 0)
 
     def turn(self, a, b):
@@ -221,7 +221,7 @@ class EndOfRoot(Events):
 
 def test_a_natural_curve_is_followed_by_its_parameter_to_where_it_ends():
     curve = Root()
-    found = both_ways(curve.at(0.0), EndOfRoot, {"p": (-1.0, 1.0)}, steps=replace(STEPS, most=0.2, aim=0.06, least=1e-6))
+    found = both_ways(curve.solution_at(0.0), EndOfRoot, {"p": (-1.0, 1.0)}, steps=replace(STEPS, most=0.2, aim=0.06, least=1e-6))
     assert found.points[0].parameter == -1.0
     assert found.ends[0] == End(CurveEnd.BOUND, -1.0)
     assert found.ends[1].parameter == pytest.approx(0.3, abs=1e-12)

@@ -26,7 +26,7 @@ class NaturalCurve(Curve[P]):
         return np.array([1.0 / self.scale])
 
     @abstractmethod
-    def at(self, value: float) -> P | None:
+    def solution_at(self, value: float) -> P | None:
         """The solution at a value of the parameter near to the one for which this curve was made; None where there is none."""
 
     @abstractmethod
@@ -35,15 +35,15 @@ class NaturalCurve(Curve[P]):
 
     def solve(self, guess: np.ndarray, direction: np.ndarray) -> P | None:
         """The solution at the parameter of the guess, whatever the direction."""
-        return self.at(float(guess[-1]))
+        return self.solution_at(float(guess[-1]))
 
     def solve_at(self, guess: np.ndarray, direction: np.ndarray, index: int = -1) -> P | None:
         """The solution at the parameter of the guess."""
-        return self.at(float(guess[-1]))
+        return self.solution_at(float(guess[-1]))
 
     def advance(self, before: P | None, point: P, step: float) -> P | None:
         """The solution a step further; the step ends at the bound if it would lead beyond it."""
-        ahead = self.at(self.ahead(point, step))
+        ahead = self.solution_at(self.ahead(point, step))
         return ahead if ahead is None or point.tangent[-1] > 0.0 else ahead.turned()
 
     def ahead(self, point: P, step: float) -> float:
@@ -72,7 +72,7 @@ def bisected(point: P, beyond: float, holds: Callable[[P], bool]) -> tuple[P, fl
     """
     while abs(beyond - point.parameter) > LOCATED_WITHIN * max(abs(point.parameter), abs(beyond)):
         middle = 0.5 * (point.parameter + beyond)
-        found = point.curve.at(middle)
+        found = point.curve.solution_at(middle)
         if found is not None and holds(found):
             point = found
         else:

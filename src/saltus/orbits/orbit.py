@@ -89,7 +89,7 @@ class PeriodicOrbit(Result):
     @cached_property
     def system(self) -> System:
         """The system, with the orbit's parameters."""
-        return self.equations.at(self.solution.values)
+        return self.equations.system_at(self.solution.values)
 
     @property
     def signature(self) -> Signature:

@@ -48,9 +48,9 @@ class Memory:
     def load(self, place: Place) -> Vec:
         """A number."""
         argument = self.arguments[place[0]]
-        return Vec(self.builder, self.at(self.pointer(place)) if hasattr(argument, "shape") else argument, self.arithmetic)
+        return Vec(self.builder, self.load_from(self.pointer(place)) if hasattr(argument, "shape") else argument, self.arithmetic)
 
-    def at(self, pointer: Any) -> Any:
+    def load_from(self, pointer: Any) -> Any:
         """LLVM's value behind a pointer."""
         loaded = self.builder.load(pointer)
         loaded.align = 8
@@ -97,7 +97,7 @@ class Memory:
         result = np.empty(RECORD_WIDTH, dtype=object)
         for k in range(RECORD_WIDTH):
             place = self._element(row, k) if self._in_table else self.pointer((name, first + row * RECORD_WIDTH + k))
-            result[k] = Vec(self.builder, self.at(place), self.arithmetic)
+            result[k] = Vec(self.builder, self.load_from(place), self.arithmetic)
         return result
 
     def _element(self, row: int, k: int) -> Any:
@@ -113,5 +113,5 @@ class Memory:
             return time - self.load(self.leaves["record_time"])
         before = self.builder.sub(self.arguments["piece"], LONG(1))
         index = self.builder.select(self.builder.icmp_signed("<", before, LONG(0)), LONG(0), before)
-        anchor = self.at(self.builder.gep(self.arguments["breaks"].data, [index]))  # as `load_tables.anchor` has it
+        anchor = self.load_from(self.builder.gep(self.arguments["breaks"].data, [index]))  # as `load_tables.anchor` has it
         return time + self.leaf(("origin",)) - Vec(self.builder, anchor, self.arithmetic)

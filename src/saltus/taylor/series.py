@@ -333,7 +333,7 @@ class Series:
                 row.place = self.builder.alloca(self._kind, self.layout.capacity)
             row.place.align = min(CACHE_LINE, 8 * self.memory.arithmetic.width)
             self._kept.append(row)
-        return Vec(self.builder, self.memory.at(self.builder.gep(row.place, [index])), self.memory.arithmetic)
+        return Vec(self.builder, self.memory.load_from(self.builder.gep(row.place, [index])), self.memory.arithmetic)
 
     def _put(self, place: Any, index: Any, value: Coefficient) -> None:
         self.builder.store(self.memory.value(value), self.builder.gep(place, [index])).align = 8

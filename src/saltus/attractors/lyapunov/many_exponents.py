@@ -64,13 +64,13 @@ def stretch_many(
     stopped: list[bool] = []
 
     def work(rows: np.ndarray) -> None:
-        follower = _Follower(ensemble, rows, states[rows], lengths[rows])
+        group = _TangentGroup(ensemble, rows, states[rows], lengths[rows])
         for p in range(periods):
             if stopped:
                 return
-            result.growth[p, rows] = follower.period(int(counts[rows[0]]))
+            result.growth[p, rows] = group.period(int(counts[rows[0]]))
             done[0] += len(rows)
-        result.states[rows] = follower.ends()
+        result.states[rows] = group.ends()
 
     with ThreadPoolExecutor(available_cores()) as pool:
         workers = [pool.submit(work, rows) for rows in groups]
@@ -91,7 +91,7 @@ def _groups(rows: np.ndarray) -> list[np.ndarray]:
     return [group for group in np.array_split(rows, least) if group.size]
 
 
-class _Follower:
+class _TangentGroup:
     """A group of motions with frames; the row of each has the coordinate, its two derivatives, the velocity, its two
     derivatives."""
 

@@ -25,7 +25,7 @@ class Program:
     model: tuple[Any, ...]  # the structure's functions and the geometry of its contact
     limits: tuple[str, ...]
 
-    def at(self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray]) -> Program:
+    def with_numbers(self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray]) -> Program:
         """The same with other numbers."""
         env, model = self.structure.prepare(parameters, records)
         return replace(self, env=env, model=model)

@@ -128,7 +128,7 @@ def refused_beyond(point: OrbitPoint, step: float, bounds: Bounds) -> End | None
     system accepts the parameters ahead, so that something else stops the steps."""
     ahead = point.parameters + SETTINGS.refused * step * point.tangent[-len(point.parameters) :]
     try:
-        point.curve.equations.at(ahead)
+        point.curve.equations.system_at(ahead)
     except SaltusError as refusal:
         near = [(name, bound) for name, pair in bounds.items() for bound in pair if np.isclose(bound, point.parameter, rtol=1e-9)]
         return End(CurveEnd.BOUND, near[0][1]) if near else End(OrbitEnd.REFUSED, point.parameter, detail=str(refusal))
@@ -315,7 +315,7 @@ def _beside(point: OrbitPoint, sequence: Events | None) -> Iterator[tuple[np.nda
     place for each such sequence at each distance. State variables that are held at the section stay held, as on all nearby
     orbits."""
     equations = point.curve.equations
-    held = equations.held(point.solution.unknowns, equations.at(point.parameters))
+    held = equations.held(point.solution.unknowns, equations.system_at(point.parameters))
     axes = np.delete(np.eye(len(point.place)) / point.curve.weights, list(held), axis=0)
     for distance in SETTINGS.beside:
         known = set()

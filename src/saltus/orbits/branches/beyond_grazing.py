@@ -111,7 +111,7 @@ def _without_impacts(point: OrbitPoint, slow: int) -> tuple[Any, np.ndarray] | E
     lengths = np.diff(np.append(point.solution.unknowns[::2], point.solution.unknowns[0] + equations.closing))
     side = signature.along()[int(np.argmax(lengths))]
     phase_zero = 2.0 * np.pi * np.ceil(touch / (2.0 * np.pi))
-    contact = np.array([float(equations.at(point.solution.values).model.contact), 0.0])
+    contact = np.array([float(equations.system_at(point.solution.values).model.contact), 0.0])
     for periods in range(1, signature.period + 1):  # families of several periods may meet here: take the shortest period
         other: Any = equations.with_signature(Signature((), periods, False, side))
         state = other.carried(contact, touch, phase_zero, point.solution.values)

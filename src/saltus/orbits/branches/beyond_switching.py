@@ -47,7 +47,7 @@ class Switching:
     events: tuple[Timed, ...]
 
     @classmethod
-    def at(cls, point: OrbitPoint) -> Switching:
+    def of_point(cls, point: OrbitPoint) -> Switching:
         """A point of a curve, with its equations and its events."""
         equations: Any = point.orbit.equations
         evaluation = point.solution.evaluation
@@ -164,7 +164,7 @@ class Switching:
 
 def from_next_event(point: OrbitPoint) -> OrbitPoint:
     """The same symmetric orbit in the equations of the half that begins with its second event."""
-    here = Switching.at(point)
+    here = Switching.of_point(point)
     phases = [timed.phase for timed in here.events]
     events = (*here.equations.signature.events[1:], here.equations.signature.events[0].image(here.equations.images))
     equations = here.equations.with_signature(replace(here.equations.signature, events=events))
@@ -204,7 +204,7 @@ def _changed(events: list[Timed], new: dict[int, Timed | None]) -> list[Timed]:
 
 def contact_change(point: OrbitPoint) -> SpecialKind:
     """The kind of the point at which an event appears or is lost: GR for a grazing, SW for a release or a closing."""
-    orbit, here = point.orbit, Switching.at(point)
+    orbit, here = point.orbit, Switching.of_point(point)
     joined = next(iter(here._together()), None) is not None
     return SpecialKind.SW if joined or orbit.pressing <= min(orbit.slowest, orbit.clearance) else SpecialKind.GR
 
@@ -226,7 +226,7 @@ def _with_other_events(point: OrbitPoint, known: tuple[Cycle, ...] = ()) -> Orbi
 
     Symmetry may let several events change at once; these are then changed one after the other, at most `MOST_TOGETHER`.
     """
-    here, reason = Switching.at(point), OrbitEnd.TWO_AT_ONCE
+    here, reason = Switching.of_point(point), OrbitEnd.TWO_AT_ONCE
     known = (*known, cycle_of(point.orbit.signature))
     for events in here.other_signatures():
         found = here.equations_with(events)

@@ -82,7 +82,7 @@ class RestingCurve(NaturalCurve[RestingPoint]):
         """The unit of length along the parameter."""
         return (self.bounds[1] - self.bounds[0]) / 3.0
 
-    def at(self, value: float) -> RestingPoint | None:
+    def solution_at(self, value: float) -> RestingPoint | None:
         """The orbit at a nearby value; None if its sequence of releases is another one, or the motion cannot be followed."""
         try:
             found = _followed(self.near, self.path, value)
@@ -158,7 +158,7 @@ class RestingEvents(Events):
         if count == len(ahead.orbit.touching):
             return None
         near, beyond = bisected(point, ahead.parameter, lambda other: len(other.orbit.touching) == count)
-        after = near.curve.at(beyond)
+        after = near.curve.solution_at(beyond)
         assert after is not None, "an orbit with other impacts"
         few, many = sorted((near, after), key=lambda other: len(other.orbit.touching))
         speed, clearance = float(many.orbit.touching.min()), few.orbit.clearance

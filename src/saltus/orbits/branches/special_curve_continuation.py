@@ -40,7 +40,7 @@ class CurveEvents(OrbitEvents):
     def interrupted(self, run: Continuation, point: SpecialCurvePoint, ahead: SpecialCurvePoint) -> End | None:
         """The end where the system refuses the parameters."""
         try:
-            ahead.curve.equations.at(ahead.parameters)
+            ahead.curve.equations.system_at(ahead.parameters)
         except ParameterError as refusal:
             return End(OrbitEnd.REFUSED, point.parameter, detail=str(refusal))
         return None

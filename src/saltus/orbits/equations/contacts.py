@@ -278,7 +278,7 @@ class ContactsEquations(OrbitEquations):
     def start(self, solution: Solution) -> dict[str, Any]:
         """Within the longest segment; for an orbit without events, at phase 0."""
         state, phases = self.split(solution.unknowns)
-        values, system = solution.values, self.at(solution.values)
+        values, system = solution.values, self.system_at(solution.values)
         if not phases.size:
             return {**arguments_of(system, self._with_held(state, self.signature.closed, values)), "time": 0.0}
         times = np.append(phases, phases[0] + self.closing) / self.frequency(values)
@@ -309,7 +309,7 @@ class ContactsEquations(OrbitEquations):
 
     def _with_held(self, state: np.ndarray, closed: int, values: np.ndarray) -> np.ndarray:
         """A state put exactly onto the contacts that are closed, and onto those that it touches without speed, up to rounding."""
-        for i, contact in enumerate(self.at(values).model.contacts):
+        for i, contact in enumerate(self.system_at(values).model.contacts):
             pair = [self._run.trace.held[i], self.own + self._run.trace.held[i]]
             if closed >> i & 1 or max(abs(contact.gap(state[pair[0]])), abs(state[pair[1]])) < TOLERANCES.touch:
                 state[pair] = float(contact.position), 0.0

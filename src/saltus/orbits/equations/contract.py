@@ -354,7 +354,7 @@ class OrbitEquations(ABC):
         """The forcing frequency at the given parameters."""
         return float(values[self.paths.index(FREQUENCY)] if FREQUENCY in self.paths else self._values[self._frequency])
 
-    def at(self, values: np.ndarray) -> System:
+    def system_at(self, values: np.ndarray) -> System:
         """The system with the given parameters.
 
         Raises

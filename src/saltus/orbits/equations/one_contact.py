@@ -94,7 +94,7 @@ class OneContactEquations(OrbitEquations):
 
     def start(self, solution: Solution) -> dict[str, Any]:
         """Just after the first impact or, without impacts, at phase 0."""
-        system = self.at(solution.values)
+        system = self.system_at(solution.values)
         if not self.signature.sides:
             return arguments_of(system, solution.unknowns)
         model, side, frequency = system.one_contact, self.signature.sides[0], self.frequency(solution.values)

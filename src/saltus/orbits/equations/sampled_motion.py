@@ -62,7 +62,7 @@ class SampledMotion:
             self.motion, series, tau, self.time[steps], position, velocity, acceleration, side, self.begins[steps]
         )
 
-    def at(self, step: int, tau: np.ndarray) -> SampledMotion:
+    def within_step(self, step: int, tau: np.ndarray) -> SampledMotion:
         """One step at other instants since its start."""
         c = self.series[step]
         powers, orders = np.vander(tau, c.shape[1], increasing=True).T, ORDERS[: c.shape[1]]
@@ -168,7 +168,7 @@ class SampledMotion:
         middle, apart, least = float(self.tau[step, sample]), float(self.tau[step, 1]), np.inf
         for share in NARROWER:
             offset = share * apart
-            instants = self.at(step, middle + offset * np.array([-1.0, 0.0, 1.0]))
+            instants = self.within_step(step, middle + offset * np.array([-1.0, 0.0, 1.0]))
             low, here, high = instants._forces(forces)[number][0]
             bend, slope = high - 2.0 * here + low, 0.5 * (high - low)
             ahead = float(np.clip(-slope / bend, -1.0 / share, 1.0 / share)) if bend > 0.0 else 0.0

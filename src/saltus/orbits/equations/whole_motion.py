@@ -100,7 +100,7 @@ class WholeMotionEquations(OrbitEquations):
 
     def start(self, solution: Solution) -> dict[str, Any]:
         """At the section."""
-        system = self.at(solution.values)
+        system = self.system_at(solution.values)
         time = float(self.signature.section or 0.0) / self.frequency(solution.values)
         return {**arguments_of(system, self.start_state(solution.unknowns, system)), "time": time}
 
@@ -223,7 +223,7 @@ class WholeMotionEquations(OrbitEquations):
             return None
         phase = float(self.signature.section or 0.0)
         try:
-            system = self.at(values)
+            system = self.system_at(values)
             found = self._followed(system, self.start_state(unknowns, system), phase / frequency, values)
         except SaltusError:  # such parameters or such a state are refused, or the motion is
             return None
@@ -276,7 +276,7 @@ class WholeMotionEquations(OrbitEquations):
             dense=True,
             sensitivities=self.paths,
         )
-        return derivatives_of(request, self._program.at(parameters, self._records))
+        return derivatives_of(request, self._program.with_numbers(parameters, self._records))
 
     def _impacts(self, motion: Motion) -> np.ndarray:
         """Times and speeds of the impacts, (n, 2), without those of accumulations; if several contacts close at one instant, each
