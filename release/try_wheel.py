@@ -2,7 +2,8 @@
 
 Each Python on the path that saltus allows, with the newest packages, and the oldest Python also with the lowest packages that
 pyproject.toml allows, which newer ones may not have, gets an environment of its own with nothing but the wheel and what it needs.
-There `saltus doctor` compares a motion with its closed form, a study is run and read back, and with --tests the tests run.
+There `saltus doctor` compares a motion with its closed form, a study is run and read back, the reproduction of the paper is added
+and makes a part, and with --tests the tests of both run.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ class Trial:
     python: str
     lowest: bool
 
-    def run(self, wheel: Path, folder: Path, tests: bool) -> str:
+    def run(self, wheel: Path, paper: Path, folder: Path, tests: bool) -> str:
         """Install and try; the row of the table that says how it went."""
         python = folder / "venv" / "bin" / "python"
         uv("venv", "--quiet", "--python", shutil.which(f"python{self.python}") or "", folder / "venv")
@@ -68,10 +69,13 @@ class Trial:
         call("-m", "saltus", "doctor")
         call("-m", "saltus", "run", STUDY, "--output", folder / "results")
         call("-m", "saltus", "status", "--verify", folder / "results")
+        uv(*install, paper)  # with what it needs beside saltus
+        uv("pip", "check", "--quiet", "--python", python)
+        call("-m", "saltus", "reproduce", "table1", "--output", folder / "paper")
         passed = "not run"
         if tests:
             shutil.copytree(ROOT / "tests", folder / "checkout" / "tests")
-            for name in ("examples", "docs", "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "pyproject.toml"):
+            for name in ("examples", "docs", "reproduction", "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "pyproject.toml"):
                 source, target = ROOT / name, folder / "checkout" / name
                 shutil.copytree(source, target) if source.is_dir() else shutil.copy(source, target)
             passed = call("-m", "pytest", "-q", folder / "checkout", "--rootdir", folder / "checkout").splitlines()[-1]
@@ -94,14 +98,15 @@ def works(python: str) -> bool:
     return command is not None and subprocess.run([command, "-c", ""], capture_output=True, check=False).returncode == 0
 
 
-def build(target: Path) -> Path:
-    """Build both archives from what is committed; the wheel."""
+def build(target: Path) -> tuple[Path, Path]:
+    """Build both archives of saltus, and those of the reproduction, from what is committed; the two wheels."""
     with tempfile.TemporaryDirectory() as folder:
         archive = subprocess.run(["git", "archive", "HEAD"], cwd=ROOT, check=True, stdout=subprocess.PIPE)
         subprocess.run(["tar", "-x", "-C", folder], input=archive.stdout, check=True)
-        subprocess.run([sys.executable, "-m", "hatchling", "build", "-d", target], cwd=folder, check=True)
-    (wheel,) = target.glob("*.whl")
-    return wheel
+        for project in (Path(folder), Path(folder) / "reproduction"):
+            subprocess.run([sys.executable, "-m", "hatchling", "build", "-d", target], cwd=project, check=True)
+    (wheel,), (paper,) = target.glob("saltus-*.whl"), target.glob("saltus_paper-*.whl")
+    return wheel, paper
 
 
 def main() -> None:
@@ -112,7 +117,7 @@ def main() -> None:
     options = parser.parse_args()
     target = ROOT / "dist"
     shutil.rmtree(target, ignore_errors=True)
-    wheel = build(target)
+    wheel, paper = build(target)
     there = [python for python in PYTHONS if works(python) and options.only in (None, python)]
     print(f"{wheel.name}: {wheel.stat().st_size / 2**20:.1f} MiB")
     print("| environment | Python | numba | NumPy | SciPy | xarray | Zarr | Matplotlib | tests |")
@@ -120,7 +125,7 @@ def main() -> None:
     for python in there:
         for lowest in (False, True) if python == PYTHONS[0] else (False,):
             with tempfile.TemporaryDirectory() as folder:
-                print(Trial(python, lowest).run(wheel, Path(folder), options.tests), flush=True)
+                print(Trial(python, lowest).run(wheel, paper, Path(folder), options.tests), flush=True)
     missing = [python for python in PYTHONS if python not in there]
     if missing:
         print(f"Not tried here: Python {', '.join(missing)}.")

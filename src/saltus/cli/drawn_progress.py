@@ -30,7 +30,8 @@ def progress_bar(title: str) -> Iterator[Progress]:
 
     Examples
     --------
-    >>> with saltus.cli.progress_bar("spectrum") as progress:
+    >>> from saltus.cli import progress_bar
+    >>> with progress_bar("spectrum") as progress:
     ...     ends = saltus.simulate_many(system, theta=[0.1, 0.3], periods=10, progress=progress)
     """
     messages, step = Console(stderr=True, highlight=False), ""

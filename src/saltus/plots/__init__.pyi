@@ -1,15 +1,12 @@
 from .any_result import DRAWINGS, plot
-from .attractors import draw_attractors
-from .basins import draw_basins, draw_uncertainty, draw_wada
+from .basins import draw_basins
 from .branch_cuts import BranchLine, ModelValidity, border_curves, branch_lines, smooth_lines
-from .chaos import draw_chaotic_bands, draw_exponents, draw_exponents_along, draw_verdict
 from .chart import chart_legend, data_is_tree, draw_chart, draw_closed_form, draw_lines, draw_stability_chart
 from .conventions import (
     DASHES,
     DOUBLE_COLUMN,
     FAINT,
     INK,
-    LIMIT,
     SEPARATRIX_LINE,
     SINGLE_COLUMN,
     STABLE,
@@ -18,18 +15,17 @@ from .conventions import (
     UNSTABLE_LINE,
     figure_of,
     new_figure,
-    outside_legend,
     panel_label,
     shades,
     style,
     styled,
 )
-from .curves import draw_attractors_along, draw_backbone, draw_branch, draw_cascade, draw_search, draw_special_curve
+from .curves import draw_backbone, draw_branch, draw_special_curve
 from .diagram import POINTS, draw_diagram
-from .ensembles import draw_ensemble, draw_sweep
+from .ensembles import draw_sweep
 from .marks import arrow_along, fixed_points, limit_lines
-from .motion import draw_motion, draw_sensitivities
-from .plane import draw_arrows, draw_manifold, draw_plane, draw_separatrix
+from .motion import draw_motion
+from .plane import draw_arrows
 from .response import (
     draw_bands,
     draw_beside,
@@ -52,7 +48,6 @@ __all__ = [
     "DRAWINGS",
     "FAINT",
     "INK",
-    "LIMIT",
     "POINTS",
     "SEPARATRIX_LINE",
     "SINGLE_COLUMN",
@@ -68,41 +63,26 @@ __all__ = [
     "chart_legend",
     "data_is_tree",
     "draw_arrows",
-    "draw_attractors",
-    "draw_attractors_along",
     "draw_backbone",
     "draw_bands",
     "draw_basins",
     "draw_beside",
     "draw_branch",
     "draw_branches",
-    "draw_cascade",
     "draw_cell",
-    "draw_chaotic_bands",
     "draw_chart",
     "draw_closed_form",
     "draw_critical",
     "draw_diagram",
-    "draw_ensemble",
-    "draw_exponents",
-    "draw_exponents_along",
     "draw_frames",
     "draw_limits",
     "draw_lines",
-    "draw_manifold",
     "draw_motion",
-    "draw_plane",
     "draw_response",
-    "draw_search",
-    "draw_sensitivities",
-    "draw_separatrix",
     "draw_special",
     "draw_special_curve",
     "draw_stability_chart",
     "draw_sweep",
-    "draw_uncertainty",
-    "draw_verdict",
-    "draw_wada",
     "draw_zoom",
     "figure_of",
     "fixed_points",
@@ -114,7 +94,6 @@ __all__ = [
     "lowest",
     "new_figure",
     "note_missed",
-    "outside_legend",
     "panel_label",
     "plot",
     "response_legend",

@@ -158,7 +158,7 @@ def other_impulse(model: TwoLayer, before: LayerState, after: LayerState, layer:
     --------
     >>> before = saltus.systems.LayerState((0.0, 0.0), (-1.0, 0.0))
     >>> after = saltus.systems.LayerState((0.0, 0.0), (0.5, 0.0))
-    >>> round(saltus.systems.other_impulse(saltus.TwoLayer(beta0=np.pi / 2), before, after, 1), 12)
+    >>> round(saltus.systems.other_impulse(saltus.TwoLayer(beta0=np.pi / 4), before, after, 1), 12)  # M_12 = 0
     0.0
     """
     s, j = layer - 1, 2 - layer
