@@ -15,9 +15,8 @@ from scipy.integrate import quad
 from shared_systems import BETA80, forced
 
 from saltus.flow import EventKind, simulate
-from saltus.flow.kernel.compiled import load_kernel
-from saltus.flow.kernel.layout import Mode, Status, Where
-from saltus.flow.kernel.memory_layout import State
+from saltus.flow.kernel.layout import Mode, Status
+from saltus.flow.kernel.memory import EventBuffers, StepBuffers
 from saltus.flow.kernel.structures import program
 from saltus.flow.motion.request import MotionRequest
 from saltus.flow.one_contact.state import KernelState
@@ -55,12 +54,11 @@ def averaged_speed(system, v0, duration, contact=0.0):
     coordinates = {system.model.coordinates[0]: contact}
     request = MotionRequest(system=system, coordinates=coordinates, stop_at=(), dense=False, **arguments)
     now = KernelState.at_start(request, run)
-    where, state, settings = now.where, now.state, now.settings
-    steps = (np.empty((64, 2), dtype=np.int64), np.empty((64, 2)), np.empty((64, 1, where[Where.ORDER] + 2)))
-    events = (np.empty((64, 4), dtype=np.int64), np.empty((64, 3)))
-    assert load_kernel()(where, state, settings, run.env, run.model, steps, events) == Status.DONE
-    assert where[Where.MODE] == Mode.CHATTER
-    return state[State.CHATTER_SPEED]
+    steps = StepBuffers(np.empty((64, 2), dtype=np.int64), np.empty((64, 2)), np.empty((64, 1, now.numbers["order"] + 2)))
+    events = EventBuffers(np.empty((64, 4), dtype=np.int64), np.empty((64, 3)))
+    assert now.advance(run, steps, events) == Status.DONE
+    assert now.numbers["mode"] == Mode.CHATTER
+    return now.numbers["chatter_speed"]
 
 
 SYMMETRIC = {"C": 0.1, "V": -0.5, "H": 0.05, "W": 0.3}

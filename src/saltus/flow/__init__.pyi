@@ -1,8 +1,9 @@
 from .contacts.layout import ContactColumn, SegmentEnd, SegmentExtremes, SegmentPlan
 from .contacts.modes import modes_of
-from .kernel.compiled import load_contact_segments, load_segments
-from .kernel.layout import STRUCTURE_SIZES, SegmentColumn, SegmentValue, Where
+from .kernel.compiled import load_segments
+from .kernel.layout import SegmentColumn, SegmentValue
 from .kernel.memory_layout import EventCode
+from .kernel.orbit_segments import SegmentFollower
 from .kernel.structures import Program, limits_of, program, taylor_order
 from .lanes.capture_speeds import captured_between
 from .lanes.compiled_lanes import load_advance, load_driver, load_helpers
@@ -40,7 +41,6 @@ from .one_contact.regularity import ContactRegularity, contact_regularity
 
 __all__ = [
     "RECURRENCE",
-    "STRUCTURE_SIZES",
     "ContactColumn",
     "ContactRegularity",
     "DenseOutput",
@@ -61,6 +61,7 @@ __all__ = [
     "SegmentColumn",
     "SegmentEnd",
     "SegmentExtremes",
+    "SegmentFollower",
     "SegmentPlan",
     "SegmentValue",
     "Sensitivities",
@@ -68,7 +69,6 @@ __all__ = [
     "TangentEnsemble",
     "Validity",
     "Wanted",
-    "Where",
     "approached",
     "available_cores",
     "captured_between",
@@ -82,7 +82,6 @@ __all__ = [
     "last_states",
     "limits_of",
     "load_advance",
-    "load_contact_segments",
     "load_driver",
     "load_helpers",
     "load_releases",

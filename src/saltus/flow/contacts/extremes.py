@@ -8,9 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.flow.contacts.impacts import contact_position, gap_series
-from saltus.flow.contacts.layout import ContactColumn, ContactPart, SegmentEnd, SegmentExtremes, SegmentPlan, Solver
-from saltus.flow.kernel.layout import Where, Work
-from saltus.flow.kernel.memory_layout import EventCode, State
+from saltus.flow.contacts.layout import ContactColumn, SegmentEnd, SegmentExtremes, SegmentPlan
+from saltus.flow.kernel.memory_layout import EventCode
 from saltus.flow.kernel.roots import NOISE, horner, roots_within, scale_gap
 from saltus.taylor import lean_jit
 
@@ -37,12 +36,12 @@ def least_of(c, order, h, t, poly, roots, seen, place):
 
 
 @lean_jit
-def extremes_at_step(where, state, model, contacts, work, solver, t, h, begin, end, roots, seen, least):
+def extremes_at_step(motion, t, h, begin, end, roots, seen, least):
     """Update the extremes with a step: extrema of the coordinates, inner minima of the guards, least values of the margins."""
-    order, own, count, poly = where[Where.ORDER], where[Where.OWN], contacts.shape[0], work[Work.POLYNOMIAL]
+    order, own, count, poly = motion.order, motion.own, motion.contacts.shape[0], motion.polynomial
     for a in range(own):
-        q, size = work[Work.POSITIONS][a], 0.0
-        scale_gap(work[Work.VELOCITIES][a], 0, order, h, poly)
+        q, size = motion.coordinate_series[a], 0.0
+        scale_gap(motion.velocity_series[a], 0, order, h, poly)
         for k in range(order + 1):
             size += abs(poly[k])
         for i in range(roots_within(poly, order, roots, NOISE * size) + 2):
@@ -51,64 +50,67 @@ def extremes_at_step(where, state, model, contacts, work, solver, t, h, begin, e
             seen[SegmentExtremes.TOP] = max(seen[SegmentExtremes.TOP], x)
             seen[SegmentExtremes.BOTTOM] = min(seen[SegmentExtremes.BOTTOM], x)
     for i in range(count):
-        guard = work[Work.GAP]
-        if contacts[i, ContactColumn.CLOSED] == 1:
-            guard = work[Work.MARGINS][i]
+        guard = motion.gap_series
+        if motion.contacts[i, ContactColumn.CLOSED] == 1:
+            guard = motion.margin_series[i]
         else:
-            gap_series(model, contacts, work, i, contact_position(solver, own, count, i), order, guard)
+            gap_series(motion, i, contact_position(motion, i), order, guard)
         least[0], least[1] = np.inf, 0.0
         least_of(guard, order, h, t, poly, roots, least, 0)
-        place = SegmentExtremes.FORCE if contacts[i, ContactColumn.CLOSED] == 1 else SegmentExtremes.GAP
+        place = SegmentExtremes.FORCE if motion.contacts[i, ContactColumn.CLOSED] == 1 else SegmentExtremes.GAP
         inside = ENDS * (end - begin) < least[1] - begin < (1.0 - ENDS) * (end - begin)
         if inside and least[0] < seen[place]:
             seen[place], seen[place + 1], seen[place + 2] = least[0], least[1], i
-    for j in range(count, where[Where.MARGINS]):
-        place, m = SegmentExtremes.MARGINS + j - count, work[Work.MARGINS][j]
+    for j in range(count, motion.margin_count):
+        place, m = SegmentExtremes.MARGINS + j - count, motion.margin_series[j]
         least[0] = min(m[0], horner(m, order, h))
         least_of(m, order, h, t, poly, roots, least, 0)
         seen[place] = min(seen[place], least[0])
 
 
 @lean_jit
-def extremes_at_start(where, state, model, contacts, work, solver, hit, seen):
+def extremes_at_start(motion, hit, seen):
     """Begin the extremes of a segment: `PULL` is the least of the reactions of closed contacts and of the acceleration with which
     the contact `hit` opens, if it opens from rest."""
     for k in range(seen.size):
         seen[k] = np.inf
     seen[SegmentExtremes.TOP] = -np.inf
-    for i in range(contacts.shape[0]):
-        pull, coordinate = np.inf, contacts[i, ContactColumn.COORDINATE]
-        if contacts[i, ContactColumn.CLOSED] == 1:
-            pull = work[Work.MARGINS][i, 0]
-        elif i == hit and abs(state[State.COORDINATES + where[Where.DOF] + coordinate]) < AT_REST:
-            pull = model[ContactPart.SIGNS][i] * work[Work.ACCELERATIONS][coordinate, 0]
+    for i in range(motion.contacts.shape[0]):
+        pull, coordinate = np.inf, motion.contacts[i, ContactColumn.COORDINATE]
+        if motion.contacts[i, ContactColumn.CLOSED] == 1:
+            pull = motion.margin_series[i, 0]
+        elif i == hit and abs(motion.velocities[coordinate]) < AT_REST:
+            pull = motion.signs[i] * motion.acceleration_series[coordinate, 0]
         if pull < seen[SegmentExtremes.PULL]:
             seen[SegmentExtremes.PULL], seen[SegmentExtremes.PULL + 1] = pull, i
 
 
 @lean_jit
-def extremes_at_section(where, state, model, contacts, work, solver, t, seen):
+def extremes_at_section(motion, t, seen):
     """Update the extremes with the guards at the start of a segment without event there: a minimum may lie just at its start."""
-    own, count = where[Where.OWN], contacts.shape[0]
+    count = motion.contacts.shape[0]
     for i in range(count):
-        closed, x = contacts[i, ContactColumn.CLOSED] == 1, state[State.COORDINATES + contacts[i, ContactColumn.COORDINATE]]
-        gap = model[ContactPart.SIGNS][i] * (x - contact_position(solver, own, count, i))
-        value, place = work[Work.MARGINS][i, 0] if closed else gap, SegmentExtremes.FORCE if closed else SegmentExtremes.GAP
+        closed, x = (
+            motion.contacts[i, ContactColumn.CLOSED] == 1,
+            motion.coordinates[motion.contacts[i, ContactColumn.COORDINATE]],
+        )
+        gap = motion.signs[i] * (x - contact_position(motion, i))
+        value, place = motion.margin_series[i, 0] if closed else gap, SegmentExtremes.FORCE if closed else SegmentExtremes.GAP
         if value < seen[place]:
             seen[place], seen[place + 1], seen[place + 2] = value, t, i
 
 
 @lean_jit
-def extremes_at_end(work, contacts, released, seen):
+def extremes_at_end(motion, released, seen):
     """Update `TAIL`, the least reaction at the end of a segment of all closed contacts but the one that is released there."""
-    for i in range(contacts.shape[0]):
-        reaction = work[Work.MARGINS][i, 0]
-        if contacts[i, ContactColumn.CLOSED] == 1 and i != released and reaction < seen[SegmentExtremes.TAIL]:
+    for i in range(motion.contacts.shape[0]):
+        reaction = motion.margin_series[i, 0]
+        if motion.contacts[i, ContactColumn.CLOSED] == 1 and i != released and reaction < seen[SegmentExtremes.TAIL]:
             seen[SegmentExtremes.TAIL], seen[SegmentExtremes.TAIL + 1] = reaction, i
 
 
 @lean_jit
-def gap_beside(where, model, contacts, solver, plan, s, duration, ends, seen):
+def gap_beside(motion, plan, s, duration, ends, seen):
     """Update `BESIDE`, the least gap at the impact with which segment s of the plan ends, of another contact whose speed the
     impact changes.
 
@@ -116,13 +118,13 @@ def gap_beside(where, model, contacts, solver, plan, s, duration, ends, seen):
     segment is divided by the power of the duration with which it grows; very short segments are skipped, where only rounding
     would be left.
     """
-    own, count, hit = where[Where.OWN], contacts.shape[0], plan[s, SegmentPlan.CONTACT]
+    own, count, hit = motion.own, motion.contacts.shape[0], plan[s, SegmentPlan.CONTACT]
     released = plan[s - 1, SegmentPlan.KIND] == EventCode.RELEASE
     for i in range(count):
-        if i == hit or plan[s, SegmentPlan.ALONG] >> i & 1 or solver[Solver.COUPLING][i, hit] == 0.0:
+        if i == hit or plan[s, SegmentPlan.ALONG] >> i & 1 or motion.coupling[i, hit] == 0.0:
             continue
-        sign, place = model[ContactPart.SIGNS][i], SegmentEnd.NUMBERS + contacts[i, ContactColumn.COORDINATE]
-        position = contact_position(solver, own, count, i)
+        sign, place = motion.signs[i], SegmentEnd.NUMBERS + motion.contacts[i, ContactColumn.COORDINATE]
+        position = contact_position(motion, i)
         gap = sign * (ends[place + 4 * own] - position)
         if sign * (ends[place] - position) < AT_REST:
             if not duration > HARDLY_OPEN:

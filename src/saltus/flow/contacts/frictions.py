@@ -13,12 +13,12 @@ from __future__ import annotations
 
 from saltus.flow.contacts.complementarity import eliminate
 from saltus.flow.contacts.impacts import record_contact_event
-from saltus.flow.contacts.layout import ContactPart, FrictionColumn, Solver
+from saltus.flow.contacts.layout import FrictionColumn
 from saltus.flow.contacts.tangent import move_columns, note_shifts, slope
-from saltus.flow.kernel.layout import EXACT, ZERO, Mode, Setting, Where, Work
-from saltus.flow.kernel.memory_layout import EventCode, State
+from saltus.flow.kernel.layout import EXACT, ZERO, Mode
+from saltus.flow.kernel.memory_layout import EventCode
 from saltus.flow.kernel.roots import NEVER, SIMPLE, contact_root, leading
-from saltus.flow.kernel.steps import expand, step_size
+from saltus.flow.kernel.steps import columns_at_event, expand, step_size
 from saltus.taylor import lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
@@ -29,77 +29,80 @@ ALIKE = 1e-12
 
 
 @lean_jit
-def hold_frictions(where, env, frictions):
+def hold_frictions(motion):
     """Tell the model's functions, through `env`, in which direction each friction slides, and that sticking coordinates are not
     free."""
-    first = env[0].size - where[Where.OWN]
-    for k in range(frictions.shape[0]):
-        slides = frictions[k, FrictionColumn.SLIDES]
-        env[0][first - frictions.shape[0] + k] = 1.0 * slides
+    first = motion.parameters.size - motion.own
+    for k in range(motion.frictions.shape[0]):
+        slides = motion.frictions[k, FrictionColumn.SLIDES]
+        motion.parameters[first - motion.frictions.shape[0] + k] = 1.0 * slides
         if slides == 0:
-            env[0][first + frictions[k, FrictionColumn.COORDINATE]] = 0.0
+            motion.parameters[first + motion.frictions[k, FrictionColumn.COORDINATE]] = 0.0
 
 
 @lean_jit
-def slide_bits(frictions, count):
+def slide_bits(motion, count):
     """The direction of each friction plus 1 (0, 1 or 2), in two bits each, behind the bits of `count` contacts."""
     bits = 0
-    for k in range(frictions.shape[0]):
-        bits |= (1 + frictions[k, FrictionColumn.SLIDES]) << (count + 2 * k)
+    for k in range(motion.frictions.shape[0]):
+        bits |= (1 + motion.frictions[k, FrictionColumn.SLIDES]) << (count + 2 * k)
     return bits
 
 
 @lean_jit
-def ground_speed(solver, frictions, k):
+def ground_speed(motion, k):
     """The speed of a friction's ground."""
-    return solver[Solver.NUMBERS][solver[Solver.NUMBERS].size - frictions.shape[0] + k]
+    return motion.solver_numbers[motion.solver_numbers.size - motion.frictions.shape[0] + k]
 
 
 @lean_jit
-def sliding_series(frictions, work, solver, k, direction, order, g):
+def sliding_series(motion, k, direction, order, g):
     """The Taylor coefficients of a friction's sliding speed along a direction."""
-    v = work[Work.VELOCITIES][frictions[k, FrictionColumn.COORDINATE]]
+    v = motion.velocity_series[motion.frictions[k, FrictionColumn.COORDINATE]]
     for i in range(order + 1):
         g[i] = direction * v[i]
-    g[0] -= direction * ground_speed(solver, frictions, k)
+    g[0] -= direction * ground_speed(motion, k)
 
 
 @lean_jit
-def friction_step_size(where, settings, frictions, count, work, natural):
+def friction_step_size(motion, count, natural):
     """The step, at most `natural`, that the series of the friction forces of sticking coordinates allow."""
-    tol = settings[Setting.TOLERANCE]
-    sharp = min(tol, EXACT) if where[Where.MODE] == Mode.REST else tol
-    for k in range(frictions.shape[0]):
-        if frictions[k, FrictionColumn.SLIDES] == 0:
-            r = work[Work.MARGINS][count + 2 * k : count + 2 * k + 2]
-            natural = min(natural, step_size(r, where[Where.ORDER], max(1.0, abs(r[0, 0])), sharp))
+    tol = motion.tolerance
+    sharp = min(tol, EXACT) if motion.mode == Mode.REST else tol
+    for k in range(motion.frictions.shape[0]):
+        if motion.frictions[k, FrictionColumn.SLIDES] == 0:
+            r = motion.margin_series[count + 2 * k : count + 2 * k + 2]
+            natural = min(natural, step_size(r, motion.order, max(1.0, abs(r[0, 0])), sharp))
     return natural
 
 
 @lean_jit
-def first_friction(where, frictions, count, work, solver, h, whole):
+def first_friction(motion, count, h, whole):
     """The friction whose guard reaches 0 first within the step, the instant, and its guard: margin 0 or 1, or 2 for the speed.
 
     Then whether the step is too long to decide on a touch near its end.
     """
-    order, hit, first, which, shorter = where[Where.ORDER], -1, NEVER, 2, False
-    for k in range(frictions.shape[0]):
-        slides, skip = frictions[k, FrictionColumn.SLIDES], frictions[k, FrictionColumn.SKIP]
+    order, hit, first, which, shorter = motion.order, -1, NEVER, 2, False
+    for k in range(motion.frictions.shape[0]):
+        slides, skip = motion.frictions[k, FrictionColumn.SLIDES], motion.frictions[k, FrictionColumn.SKIP]
         for b in range(2):
-            known, guard = skip, work[Work.GAP]
+            known, guard = skip, motion.gap_series
             if slides == 0:
-                known, guard = skip if frictions[k, FrictionColumn.MARGIN] == b else 0, work[Work.MARGINS][count + 2 * k + b]
+                known, guard = (
+                    skip if motion.frictions[k, FrictionColumn.MARGIN] == b else 0,
+                    motion.margin_series[count + 2 * k + b],
+                )
                 if known == 0 and guard[0] < -ZERO:
                     return k, 0.0, b, False
             elif b == 1:
                 continue
             else:
-                sliding_series(frictions, work, solver, k, 1.0 * slides, order, guard)
+                sliding_series(motion, k, 1.0 * slides, order, guard)
                 if known == 0 and guard[0] < 0.0:  # by rounding, see `undecided`
                     return k, 0.0, 2, False
             if known >= order:
                 continue
-            kind, u, touch = contact_root(guard, known, order, h, work[Work.POLYNOMIAL])
+            kind, u, touch = contact_root(guard, known, order, h, motion.polynomial)
             if kind == SIMPLE and u < first:
                 hit, first, which = k, u, b if slides == 0 else 2
             shorter = shorter or (kind != SIMPLE and 0.75 < touch <= 1.0 and whole)
@@ -107,149 +110,148 @@ def first_friction(where, frictions, count, work, solver, h, whole):
 
 
 @lean_jit
-def reach(where, state, env, model, work, solver, frictions, count, t, origin, k, which, later):
+def reach(motion, count, t, k, which, later):
     """Take the motion, with the tangent's columns, to the instant at which a friction's guard is 0.
 
     If that is the sliding speed, it is set to exactly 0; the instant moves by dt = -(z - w_c) / a.
     """
-    own, dof, rest = where[Where.OWN], where[Where.DOF], frictions[k, FrictionColumn.COORDINATE]
-    shifts = State.COORDINATES + 2 * dof
-    if where[Where.COLUMNS] > 0:
-        expand(where, state, env, model, work, t, origin, 1.0, 1)
+    own, rest = motion.own, motion.frictions[k, FrictionColumn.COORDINATE]
+    if motion.columns > 0:
+        expand(motion, t, 1.0, 1)
         if which < 2:
             row = count + 2 * k + which
-            model[ContactPart.TANGENT](EventCode.RELEASE, row, t, origin, 1.0, env, where[Where.PIECE], state)
-        for j in range(where[Where.COLUMNS]):
+            columns_at_event(motion, EventCode.RELEASE, row, t, 1.0)
+        for j in range(motion.columns):
             if which < 2:
-                state[shifts + j] /= -work[Work.MARGINS][row, 1]
+                motion.shifts[j] /= -motion.margin_series[row, 1]
             else:
-                moved = slope(solver, own, count, j, solver[Solver.NUMBERS].size - frictions.shape[0] + k)
-                sliding = state[State.COORDINATES + dof + own * (1 + j) + rest] - moved
-                state[shifts + j] = -sliding / work[Work.ACCELERATIONS][rest, 0]
-        move_columns(where, state, work, 1.0)
+                moved = slope(motion, j, motion.solver_numbers.size - motion.frictions.shape[0] + k)
+                sliding = motion.velocities[own * (1 + j) + rest] - moved
+                motion.shifts[j] = -sliding / motion.acceleration_series[rest, 0]
+        move_columns(motion, 1.0)
     if which == 2:
-        state[State.COORDINATES + dof + rest] = ground_speed(solver, frictions, k)
-    frictions[k, FrictionColumn.REACHED] = 3 if which == 2 else 1 + which if later else 0
+        motion.velocities[rest] = ground_speed(motion, k)
+    motion.frictions[k, FrictionColumn.REACHED] = 3 if which == 2 else 1 + which if later else 0
 
 
 @lean_jit
-def undecided(where, state, solver, frictions):
+def undecided(motion):
     """The frictions with exactly the speed of their ground, as bits; for the others the direction in which they slide is noted.
 
     If blocks move alike, the sliding speed of one may have changed its sign, within rounding, at the instant of another one's
     event. Its direction is then kept, so that it has its own event next, to which it takes the tangent's columns.
     """
     bits = 0
-    for k in range(frictions.shape[0]):
-        place = State.COORDINATES + where[Where.DOF] + frictions[k, FrictionColumn.COORDINATE]
-        rate = state[place] - ground_speed(solver, frictions, k)
+    for k in range(motion.frictions.shape[0]):
+        place = motion.frictions[k, FrictionColumn.COORDINATE]
+        rate = motion.velocities[place] - ground_speed(motion, k)
         if rate == 0.0:
             bits |= 1 << k
-        elif abs(rate) > ZERO or rate * frictions[k, FrictionColumn.SLIDES] >= 0.0:
-            frictions[k, FrictionColumn.SLIDES], frictions[k, FrictionColumn.SKIP] = 1 if rate > 0.0 else -1, 0
+        elif abs(rate) > ZERO or rate * motion.frictions[k, FrictionColumn.SLIDES] >= 0.0:
+            motion.frictions[k, FrictionColumn.SLIDES], motion.frictions[k, FrictionColumn.SKIP] = 1 if rate > 0.0 else -1, 0
     return bits
 
 
 @lean_jit
-def choose_slides(frictions, candidates, choice):
+def choose_slides(motion, candidates, choice):
     """Let each of the candidates stick, slide forwards or slide backwards, by the base-3 digits of `choice`; False if a friction
     that is no candidate has a digit other than 0."""
-    for k in range(frictions.shape[0]):
+    for k in range(motion.frictions.shape[0]):
         digit, choice = choice % 3, choice // 3
         if candidates >> k & 1:
-            frictions[k, FrictionColumn.SLIDES] = digit if digit < 2 else -1
+            motion.frictions[k, FrictionColumn.SLIDES] = digit if digit < 2 else -1
         elif digit > 0:
             return False
     return True
 
 
 @lean_jit
-def slides_so(where, frictions, count, work, solver, candidates):
+def slides_so(motion, count, candidates):
     """Whether the first non-zero Taylor coefficients of their guards confirm the choice for the candidates; notes how many
     coefficients before them are 0."""
-    order, g = where[Where.ORDER], work[Work.GAP]
-    for k in range(frictions.shape[0]):
+    order, g = motion.order, motion.gap_series
+    for k in range(motion.frictions.shape[0]):
         if not candidates >> k & 1:
             continue
-        slides, reached = frictions[k, FrictionColumn.SLIDES], frictions[k, FrictionColumn.REACHED]
-        frictions[k, FrictionColumn.SKIP], frictions[k, FrictionColumn.MARGIN] = 0, 0
+        slides, reached = motion.frictions[k, FrictionColumn.SLIDES], motion.frictions[k, FrictionColumn.REACHED]
+        motion.frictions[k, FrictionColumn.SKIP], motion.frictions[k, FrictionColumn.MARGIN] = 0, 0
         if slides == 0:
             for b in range(2):
-                row = work[Work.MARGINS][count + 2 * k + b]
+                row = motion.margin_series[count + 2 * k + b]
                 i = leading(row, 1 if reached == 1 + b or (reached > 0 and abs(row[0]) <= ALIKE) else 0, order)
                 if i < order and row[i] < 0.0:
                     return False
                 if i > 0:
-                    frictions[k, FrictionColumn.SKIP], frictions[k, FrictionColumn.MARGIN] = i, b
+                    motion.frictions[k, FrictionColumn.SKIP], motion.frictions[k, FrictionColumn.MARGIN] = i, b
             continue
-        sliding_series(frictions, work, solver, k, 1.0 * slides, order, g)
+        sliding_series(motion, k, 1.0 * slides, order, g)
         i = leading(g, 2 if reached > 0 and abs(g[1]) <= ALIKE else 1, order)
         if i == order or g[i] < 0.0:
             return False
-        frictions[k, FrictionColumn.SKIP] = i
+        motion.frictions[k, FrictionColumn.SKIP] = i
     return True
 
 
 @lean_jit
-def record_slides(where, state, contacts, frictions, events, before, t, shifts):
+def record_slides(motion, before, t):
     """Record the frictions that have begun to stick or to slide, or have reversed, since the directions `before` (base-3
     digits)."""
-    for k in range(frictions.shape[0]):
-        was, slides = before % 3 - 1, frictions[k, FrictionColumn.SLIDES]
+    for k in range(motion.frictions.shape[0]):
+        was, slides = before % 3 - 1, motion.frictions[k, FrictionColumn.SLIDES]
         before //= 3
         if slides != was:
             kind = EventCode.SLIP if was == 0 else EventCode.STICK if slides == 0 else EventCode.REVERSAL
-            record_contact_event(where, state, contacts, events, kind, 1 << (contacts.shape[0] + k), t)
-            note_shifts(where, state, contacts, events, state, shifts)
+            record_contact_event(motion, kind, 1 << (motion.contacts.shape[0] + k), t)
+            note_shifts(motion, motion.shifts)
 
 
 @lean_jit
-def slides_before(frictions):
+def slides_before(motion):
     """The directions of all frictions plus 1, as the base-3 digits of a number."""
     number = 0
-    for k in range(frictions.shape[0] - 1, -1, -1):
-        number = 3 * number + 1 + frictions[k, FrictionColumn.SLIDES]
+    for k in range(motion.frictions.shape[0] - 1, -1, -1):
+        number = 3 * number + 1 + motion.frictions[k, FrictionColumn.SLIDES]
     return number
 
 
 @lean_jit
-def stick_columns(where, state, solver, frictions, count):
+def stick_columns(motion, count):
     """The columns of sticking coordinates: z = w_c, by the impulses p with which friction stops them in neighbouring motions that
     slide, M dz = S p.
 
     When a friction begins to stick during the motion, no impulse is left. At the start of a motion, neighbouring motions slide
     for a time of the order of their sliding speeds, in which nothing else changes to first order.
     """
-    own, dof, block = where[Where.OWN], where[Where.DOF], solver[Solver.BLOCK]
-    for j in range(where[Where.COLUMNS]):
+    own, block = motion.own, motion.block
+    for j in range(motion.columns):
         size = 0
-        for k in range(frictions.shape[0]):
-            if frictions[k, FrictionColumn.SLIDES] == 0:
-                a, column = frictions[k, FrictionColumn.COORDINATE], 0
-                for other in range(frictions.shape[0]):
-                    if frictions[other, FrictionColumn.SLIDES] == 0:
-                        block[size, column] = solver[Solver.INVERSE][a, frictions[other, FrictionColumn.COORDINATE]]
+        for k in range(motion.frictions.shape[0]):
+            if motion.frictions[k, FrictionColumn.SLIDES] == 0:
+                a, column = motion.frictions[k, FrictionColumn.COORDINATE], 0
+                for other in range(motion.frictions.shape[0]):
+                    if motion.frictions[other, FrictionColumn.SLIDES] == 0:
+                        block[size, column] = motion.inverse[a, motion.frictions[other, FrictionColumn.COORDINATE]]
                         column += 1
-                moved = slope(solver, own, count, j, solver[Solver.NUMBERS].size - frictions.shape[0] + k)
-                block[size, column] = moved - state[State.COORDINATES + dof + own * (1 + j) + a]
+                moved = slope(motion, j, motion.solver_numbers.size - motion.frictions.shape[0] + k)
+                block[size, column] = moved - motion.velocities[own * (1 + j) + a]
                 size += 1
         eliminate(block, size, size + 1)
         row = 0
-        for k in range(frictions.shape[0]):
-            if frictions[k, FrictionColumn.SLIDES] == 0:
+        for k in range(motion.frictions.shape[0]):
+            if motion.frictions[k, FrictionColumn.SLIDES] == 0:
                 for a in range(own):
-                    gain = solver[Solver.INVERSE][a, frictions[k, FrictionColumn.COORDINATE]]
-                    state[State.COORDINATES + dof + own * (1 + j) + a] += gain * block[row, size]
+                    gain = motion.inverse[a, motion.frictions[k, FrictionColumn.COORDINATE]]
+                    motion.velocities[own * (1 + j) + a] += gain * block[row, size]
                 row += 1
 
 
 @lean_jit
-def all_stand(where, env, solver, frictions):
+def all_stand(motion):
     """Whether no coordinate moves: none is free, and all sticking ones do so on ground at rest."""
-    for i in range(env[0].size - where[Where.OWN], env[0].size):
-        if env[0][i] != 0.0:
+    for i in range(motion.parameters.size - motion.own, motion.parameters.size):
+        if motion.parameters[i] != 0.0:
             return False
     moves = False
-    for k in range(frictions.shape[0]):
-        moves = moves or ground_speed(solver, frictions, k) != 0.0
+    for k in range(motion.frictions.shape[0]):
+        moves = moves or ground_speed(motion, k) != 0.0
     return not moves

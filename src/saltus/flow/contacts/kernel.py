@@ -28,28 +28,21 @@ from saltus.flow.contacts.impacts import (
     couple,
     gap_series,
     hold_coordinates,
-    is_smooth,
     record_contact_event,
 )
-from saltus.flow.contacts.layout import (
-    GAP_ROUNDING,
-    NEAR,
-    ContactColumn,
-    ContactPart,
-    FrictionColumn,
-)
+from saltus.flow.contacts.layout import GAP_ROUNDING, NEAR, ContactColumn, FrictionColumn
 from saltus.flow.contacts.solver_memory import solver_arrays
 from saltus.flow.contacts.tangent import (
     fill_slopes,
     note_shifts,
     release_columns,
 )
-from saltus.flow.kernel.function_types import ADVANCE_CONTACTS
-from saltus.flow.kernel.layout import BATCH, SHORTEST, ZERO, Mode, Setting, Status, Where, Work
-from saltus.flow.kernel.memory_layout import EventCode, State
+from saltus.flow.kernel.layout import SHORTEST, ZERO, Mode, Status
+from saltus.flow.kernel.memory import ContactsParts
+from saltus.flow.kernel.memory_layout import EventCode
 from saltus.flow.kernel.roots import NEVER, SIMPLE, contact_root, horner, horner_slope, margin_root
-from saltus.flow.kernel.steps import expand, move, next_target, record_step, work_arrays
-from saltus.taylor import by_reference, cached_jit, lean_jit
+from saltus.flow.kernel.steps import columns_at_event, expand, move, record_step, step_arrays
+from saltus.taylor import jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
@@ -61,22 +54,22 @@ WORTH = 0.8  # A lower order is tried only below this share of the usual one.
 
 
 @lean_jit
-def first_guard(where, model, contacts, work, solver, h, whole):
+def first_guard(motion, h, whole):
     """The contact whose guard reaches 0 first within the step, the instant, and whether the step is too long to decide on a touch
     near its end."""
-    order, own, count = where[Where.ORDER], where[Where.OWN], contacts.shape[0]
+    order, count = motion.order, motion.contacts.shape[0]
     hit, first, shorter = -1, NEVER, False
     for i in range(count):
-        skip, guard = contacts[i, ContactColumn.SKIP], work[Work.GAP]
-        if contacts[i, ContactColumn.CLOSED] == 1:
-            guard = work[Work.MARGINS][i]
+        skip, guard = motion.contacts[i, ContactColumn.SKIP], motion.gap_series
+        if motion.contacts[i, ContactColumn.CLOSED] == 1:
+            guard = motion.margin_series[i]
             if skip == 0 and guard[0] < -ZERO:
                 return i, 0.0, False
             if skip >= order:
                 continue
         else:
-            gap_series(model, contacts, work, i, contact_position(solver, own, count, i), order, guard)
-        kind, u, touch = contact_root(guard, skip, order, h, work[Work.POLYNOMIAL])
+            gap_series(motion, i, contact_position(motion, i), order, guard)
+        kind, u, touch = contact_root(guard, skip, order, h, motion.polynomial)
         if kind == SIMPLE and u < first:
             hit, first = i, u
         shorter = shorter or (kind != SIMPLE and 0.75 < touch <= 1.0 and whole)
@@ -84,66 +77,70 @@ def first_guard(where, model, contacts, work, solver, h, whole):
 
 
 @lean_jit
-def together(where, model, contacts, work, solver, hit, tau):
+def together(motion, hit, tau):
     """The open contacts that close with `hit` at `tau` within the step, to within rounding, as bits."""
-    order, own, count, bits, g = where[Where.ORDER], where[Where.OWN], contacts.shape[0], 1 << hit, work[Work.GAP]
+    order, count, bits, g = motion.order, motion.contacts.shape[0], 1 << hit, motion.gap_series
     for i in range(count):
-        if i == hit or contacts[i, ContactColumn.CLOSED] == 1:
+        if i == hit or motion.contacts[i, ContactColumn.CLOSED] == 1:
             continue
-        gap_series(model, contacts, work, i, contact_position(solver, own, count, i), order, g)
-        size = abs(g[0]) + abs(g[1]) * tau + abs(g[2]) * tau * tau + GAP_ROUNDING * abs(contact_position(solver, own, count, i))
+        gap_series(motion, i, contact_position(motion, i), order, g)
+        size = abs(g[0]) + abs(g[1]) * tau + abs(g[2]) * tau * tau + GAP_ROUNDING * abs(contact_position(motion, i))
         if horner(g, order, tau) <= NEAR * size and horner_slope(g, order, tau) < 0.0:
             bits |= 1 << i
     return bits
 
 
 @lean_jit
-def short_order(where, state, settings, env, model, contacts, work, t, origin):
+def short_order(motion, t):
     """The order of the series for a step to the next impact of a contact that has just impacted: lower than usual if that
     suffices.
 
     Until its next impact the gap is nearly a parabola, whose duration is known. Most impacts of accumulations are so close.
     """
-    order, first, flight = where[Where.ORDER], State.COORDINATES + where[Where.DOF], np.inf
-    for i in range(contacts.shape[0]):
-        rate = model[ContactPart.SIGNS][i] * state[first + contacts[i, ContactColumn.COORDINATE]]
-        if contacts[i, ContactColumn.CLOSED] == 0 and contacts[i, ContactColumn.SKIP] == 1 and 0.0 < rate < FAST_IMPACT:
+    order, flight = motion.order, np.inf
+    for i in range(motion.contacts.shape[0]):
+        rate = motion.signs[i] * motion.velocities[motion.contacts[i, ContactColumn.COORDINATE]]
+        if (
+            motion.contacts[i, ContactColumn.CLOSED] == 0
+            and motion.contacts[i, ContactColumn.SKIP] == 1
+            and 0.0 < rate < FAST_IMPACT
+        ):
             if flight == np.inf:
-                expand(where, state, env, model, work, t, origin, 1.0, 0)
-            pull = model[ContactPart.SIGNS][i] * work[Work.ACCELERATIONS][contacts[i, ContactColumn.COORDINATE], 0]
+                expand(motion, t, 1.0, 0)
+            pull = motion.signs[i] * motion.acceleration_series[motion.contacts[i, ContactColumn.COORDINATE], 0]
             if pull < 0.0:
                 flight = min(flight, -2.0 * rate / pull)
     if not flight < RADIUS:
         return order
-    lower = max(LEAST_ORDER, math.ceil(math.log(settings[Setting.TOLERANCE]) / math.log(flight / RADIUS)))
+    lower = max(LEAST_ORDER, math.ceil(math.log(motion.tolerance) / math.log(flight / RADIUS)))
     return lower if lower < WORTH * order else order
 
 
 @lean_jit
-def seek_event(where, state, settings, env, model, contacts, frictions, work, solver, t, origin, target):
+def seek_event(motion, t, target):
     """Expand the motion, and find the first zero of a guard or of a margin within a step.
 
     Returns the length of the step, and the length that the series allow; the contact, the friction and the margin, of which the
     one with the first zero is given and the others are -1; which of the friction's guards it is; and the share of the step of the
     zero.
     """
-    order, count, margins = where[Where.ORDER], contacts.shape[0], where[Where.MARGINS]
-    size = expand(where, state, env, model, work, t, origin, 1.0, order)
-    natural = contact_step_size(where, settings, env, model, contacts, work, t, origin, target, size)
-    natural = friction_step_size(where, settings, frictions, count, work, natural)
+    order, count, margins = motion.order, motion.contacts.shape[0], motion.margin_count
+    size = expand(motion, t, 1.0, order)
+    natural = contact_step_size(motion, t, target, size)
+    natural = friction_step_size(motion, count, natural)
     h = min(natural, target - t)
     whole = h == natural
-    hit, first, shorter = first_guard(where, model, contacts, work, solver, h, whole)
-    rubs, first_rub, which, shorter_rub = first_friction(where, frictions, count, work, solver, h, whole)
+    hit, first, shorter = first_guard(motion, h, whole)
+    rubs, first_rub, which, shorter_rub = first_friction(motion, count, h, whole)
     if rubs >= 0 and first_rub < first:
         hit, first = -1, first_rub
     else:
         rubs = -1
     if (shorter or shorter_rub) and hit < 0 and rubs < 0:
         h = 0.5 * h
-    limit, first_limit, held = -1, NEVER, count + 2 * frictions.shape[0]
+    limit, first_limit, held = -1, NEVER, count + 2 * motion.frictions.shape[0]
     for j in range(held, margins):
-        u = margin_root(work[Work.MARGINS][j], order, h, work[Work.POLYNOMIAL])
+        u = margin_root(motion.margin_series[j], order, h, motion.polynomial)
         if u < first_limit:
             limit, first_limit = j, u
     if first_limit <= first and limit >= 0:
@@ -154,108 +151,86 @@ def seek_event(where, state, settings, env, model, contacts, frictions, work, so
 
 
 @lean_jit
-def contact_arc(where, state, settings, env, model, contacts, frictions, work, solver, steps, events, origin, target):
+def contact_arc(motion, target):
     """One smooth step, up to the first zero of a guard or of a margin. Returns PAUSED, or why the motion ends."""
-    order, t, count = where[Where.ORDER], state[State.TIME], contacts.shape[0]
-    held = count + 2 * frictions.shape[0]
-    where[Where.ORDER] = short_order(where, state, settings, env, model, contacts, work, t, origin)
-    h, natural, hit, rubs, limit, which, first = seek_event(
-        where, state, settings, env, model, contacts, frictions, work, solver, t, origin, target
-    )
-    if where[Where.ORDER] < order and hit < 0:  # the impact does not come as soon as it seemed
-        where[Where.ORDER] = order
-        h, natural, hit, rubs, limit, which, first = seek_event(
-            where, state, settings, env, model, contacts, frictions, work, solver, t, origin, target
-        )
+    order, t, count = motion.order, motion.time, motion.contacts.shape[0]
+    held = count + 2 * motion.frictions.shape[0]
+    motion.order = short_order(motion, t)
+    h, natural, hit, rubs, limit, which, first = seek_event(motion, t, target)
+    if motion.order < order and hit < 0:  # the impact does not come as soon as it seemed
+        motion.order = order
+        h, natural, hit, rubs, limit, which, first = seek_event(motion, t, target)
     found = hit >= 0 or rubs >= 0
     tau = first * h if found or limit >= 0 else h
     bits = 0
-    if hit >= 0 and contacts[hit, ContactColumn.CLOSED] == 0:
-        bits = together(where, model, contacts, work, solver, hit, tau)
-    finite = move(where, state, work[Work.POSITIONS], work[Work.VELOCITIES], tau)
-    for i in range(where[Where.OWN]):
-        for k in range(where[Where.ORDER] + 2, order + 2):
-            work[Work.POSITIONS][i, k] = 0.0
-    where[Where.ORDER] = order
-    record_step(where, steps, where[Where.SIDE], t, tau, work[Work.POSITIONS])
+    if hit >= 0 and motion.contacts[hit, ContactColumn.CLOSED] == 0:
+        bits = together(motion, hit, tau)
+    finite = move(motion, tau)
+    for i in range(motion.own):
+        for k in range(motion.order + 2, order + 2):
+            motion.coordinate_series[i, k] = 0.0
+    motion.order = order
+    record_step(motion, motion.side, t, tau)
     if not finite or not h >= 0.0:
         return Status.NOT_FINITE
-    state[State.TIME] = target if not found and limit < 0 and h == target - t else t + tau
+    motion.time = target if not found and limit < 0 and h == target - t else t + tau
     for i in range(count):
-        contacts[i, ContactColumn.SKIP] = 0
-    for k in range(frictions.shape[0]):
-        frictions[k, FrictionColumn.SKIP] = 0
+        motion.contacts[i, ContactColumn.SKIP] = 0
+    for k in range(motion.frictions.shape[0]):
+        motion.frictions[k, FrictionColumn.SKIP] = 0
     if bits > 0:
-        where[Where.MODE] = Mode.CONTACT
-        t = state[State.TIME]
-        return contact_impact(where, state, env, model, contacts, frictions, work, solver, events, t, origin, bits)
+        motion.mode = Mode.CONTACT
+        t = motion.time
+        return contact_impact(motion, t, bits)
     if hit >= 0:
-        if where[Where.COLUMNS] > 0:
-            release_columns(where, state, env, model, contacts, work, solver, state[State.TIME], origin, hit)
-        where[Where.MODE], contacts[hit, ContactColumn.RELEASED] = Mode.CONTACT, 1 if first > 0.0 else 0
+        if motion.columns > 0:
+            release_columns(motion, motion.time, hit)
+        motion.mode, motion.contacts[hit, ContactColumn.RELEASED] = Mode.CONTACT, 1 if first > 0.0 else 0
     if rubs >= 0:
-        fill_slopes(where, state, env, model, solver)
-        reach(where, state, env, model, work, solver, frictions, count, state[State.TIME], origin, rubs, which, first > 0.0)
-        where[Where.MODE] = Mode.CONTACT
+        fill_slopes(motion)
+        reach(motion, count, motion.time, rubs, which, first > 0.0)
+        motion.mode = Mode.CONTACT
     if limit >= 0:
-        record_contact_event(where, state, contacts, events, EventCode.LIMIT, 0, state[State.TIME])
-        events[0][where[Where.EVENTS] - 1, 3] = limit - held
-        if where[Where.COLUMNS] > 0:
-            piece, shifts = where[Where.PIECE], State.COORDINATES + 2 * where[Where.DOF]
-            model[ContactPart.TANGENT](EventCode.LIMIT, limit - held, state[State.TIME], origin, 1.0, env, piece, state)
-            note_shifts(where, state, contacts, events, state, shifts)
+        record_contact_event(motion, EventCode.LIMIT, 0, motion.time)
+        motion.event_labels[motion.recorded_events - 1, 3] = limit - held
+        if motion.columns > 0:
+            columns_at_event(motion, EventCode.LIMIT, limit - held, motion.time, 1.0)
+            note_shifts(motion, motion.shifts)
         return Status.LIMITED
-    unit = min(settings[Setting.LENGTH], 1.0) if settings[Setting.LENGTH] > 0.0 else 1.0
+    unit = min(motion.period_length, 1.0) if motion.period_length > 0.0 else 1.0
     ended = found or natural > 0.1 * SHORTEST * unit or h == target - t
     return Status.PAUSED if ended else Status.STALLED
 
 
 @lean_jit
-def advance_contacts_with(where, state, settings, env_of, model_of, contacts, frictions, arrays, solver_of, steps, events):
-    """`advance_contacts` with the arrays of `Work` and of `Solver`."""
-    env, model, work, solver = by_reference(env_of), by_reference(model_of), by_reference(arrays), by_reference(solver_of)
-    couple(where, state, env, model, contacts, solver)
-    hold_coordinates(where, env, contacts)
-    hold_frictions(where, env, frictions)
-    for batch in range(BATCH):
-        if where[Where.UNTIL_SMOOTH] > 0 and batch > 0 and frictions.shape[0] == 0 and is_smooth(where, contacts):
-            return Status.SMOOTH
-        if where[Where.STEPS] >= steps[1].shape[0] - 4 or where[Where.EVENTS] >= events[1].shape[0] - 4:
-            return Status.FULL
-        origin = where[Where.PERIOD] * settings[Setting.LENGTH]
-        t_end = settings[Setting.END] if where[Where.PERIOD] == where[Where.LAST_PERIOD] else settings[Setting.LENGTH]
-        if state[State.TIME] >= t_end and (where[Where.MODE] != Mode.CONTACT or where[Where.PERIOD] < where[Where.LAST_PERIOD]):
-            if where[Where.PERIOD] == where[Where.LAST_PERIOD]:
-                return Status.DONE
-            where[Where.PERIOD] += 1
-            state[State.TIME] -= t_end
-            continue
-        piece = where[Where.PIECE]
-        target = next_target(where, state, env[2], origin, t_end)
-        held = closed_bits(contacts) != 0 or frictions.shape[0] > 0
-        if where[Where.PIECE] != piece and held and where[Where.MODE] != Mode.CONTACT:
-            where[Where.MODE] = Mode.CONTACT  # the load may have jumped
-        status = Status.PAUSED
-        if where[Where.MODE] == Mode.CONTACT:
-            status = decide_contacts(where, state, settings, env, model, contacts, frictions, work, solver, events, origin)
-        else:
-            status = contact_arc(
-                where, state, settings, env, model, contacts, frictions, work, solver, steps, events, origin, target
-            )
-        if status != Status.PAUSED:
-            return status
-    return Status.PAUSED
+def begin(motion):
+    """Fill the memory that depends on the contacts and on the state."""
+    couple(motion)
+    hold_coordinates(motion)
+    hold_frictions(motion)
 
 
-@cached_jit(ADVANCE_CONTACTS)
-def advance_contacts(where, state, settings, env, model, rows, steps, events):
-    """Advance a motion until it ends, a buffer is full, or a batch of steps is done; returns the reason.
+@lean_jit
+def waits(motion):
+    """Whether a decision is due before the motion may end."""
+    return motion.mode == Mode.CONTACT
 
-    `rows` has the rows of the contacts, then those of the frictions.
-    """
-    count = model[ContactPart.SIGNS].size
+
+@lean_jit
+def one_pass(motion, target, t_end):
+    """A step up to `target` at most, or a decision. Returns PAUSED, or why the motion ends."""
+    held = closed_bits(motion) != 0 or motion.frictions.shape[0] > 0
+    if motion.new_piece > 0 and held and motion.mode != Mode.CONTACT:
+        motion.mode = Mode.CONTACT
+    if motion.mode == Mode.CONTACT:
+        return decide_contacts(motion)
+    return contact_arc(motion, target)
+
+
+@jit
+def parts_of(numbers, state, env, functions, rows, buffers):
+    """The memory of a motion but for its numbers as one named tuple; `rows` are those of contacts, then of frictions."""
+    count, steps = functions.signs.size, step_arrays(numbers)
     contacts, frictions = rows[:count], rows[count:]
-    solver = solver_arrays(where[Where.OWN], count, where[Where.COLUMNS], frictions.shape[0])
-    return advance_contacts_with(
-        where, state, settings, env, model, contacts, frictions, work_arrays(where), solver, steps, events
-    )
+    solver = solver_arrays(numbers.own, count, numbers.columns, frictions.shape[0])
+    return ContactsParts(state, env, env[0], env[2], functions, contacts, frictions, steps, solver, buffers[0], buffers[1])

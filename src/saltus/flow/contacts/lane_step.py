@@ -12,8 +12,9 @@ import numpy as np
 
 from saltus.flow.contacts.layout import ContactColumn, FrictionColumn
 from saltus.flow.contacts.solver_memory import solver_arrays
-from saltus.flow.kernel.layout import WHERE_LENGTH, Mode
-from saltus.flow.kernel.memory_layout import SERIES_LENGTH, LanePart, State
+from saltus.flow.kernel.layout import Mode
+from saltus.flow.kernel.memory import MOTION
+from saltus.flow.kernel.memory_layout import SERIES_LENGTH, LanePart
 from saltus.flow.lanes.contact_steps import free_step, of_free, one_free_step, one_is_free, pass_ends_of_free
 from saltus.flow.lanes.contacts_of_lane import tell_closed
 from saltus.flow.lanes.lane_impacts import resolve_impacts
@@ -59,13 +60,13 @@ def lane_arrays(sizes, at):
 
 @jit
 def lane_space(sizes, at):
-    """Room for two polynomials of one lane, and for an impact: the scalar kernel's `where`, `state`, `contacts` and `solver`."""
+    """Room for two polynomials of one lane, and for an impact: a record MOTION, `state`, `contacts` and the solver's arrays."""
     own, count, frictions = sizes[Size.OWN], sizes[Size.CONTACTS], sizes[Size.FRICTIONS]
     return (
         np.zeros(SERIES_LENGTH + 2),
         np.zeros(SERIES_LENGTH + 2),
-        np.zeros(WHERE_LENGTH, dtype=np.int64),
-        np.zeros(State.COORDINATES + 2 * own),
+        np.zeros(1, dtype=MOTION),
+        np.zeros(2 * own),
         np.zeros((count, ContactColumn.WAITS + 1), dtype=np.int64),
         solver_arrays(own, count, 0, frictions),
     )

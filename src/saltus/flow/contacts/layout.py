@@ -25,39 +25,6 @@ class FrictionColumn(IntEnum):
     REACHED = 4  # 1 or 2: this margin has just reached 0; 3: the sliding speed has
 
 
-class ContactPart(IntEnum):
-    """Places in the tuple `model`: the functions of a structure that the kernel calls, and the signs of the contacts."""
-
-    SERIES = 0
-    MATRICES = 1
-    SIGNS = 2
-    SLOPES = 3  # the derivatives, along each column of the tangent, of the numbers that `MATRICES` fills
-    TANGENT = 4
-
-
-class Solver(IntEnum):
-    """Places in the tuple `solver` of arrays, in which impacts and closed contacts are solved for."""
-
-    NUMBERS = 0  # filled by `MATRICES`: mass matrix by rows, E by rows, positions, speeds of the frictions' grounds
-    INVERSE = 1  # of the mass matrix
-    COUPLING = 2  # the rates that unit impulses of the contacts give to the gaps, signs included
-    BLOCK = 3  # the rows of a linear system, with its right-hand sides behind them
-    REDUCED = 4  # the coupling of some of the contacts
-    RIGHT = 5
-    IMPULSES = 6
-    TRIED = 7
-    RATES = 8  # of the gaps before an impact
-    GAPS = 9
-    PULLS = 10  # the second derivatives of the gaps with no contact closed
-    FALLING_GAPS = 11  # while an accumulation is followed
-    FALLING_RATES = 12
-    FALLING_PULLS = 13
-    SLOPES = 14  # a row for each column of the tangent: the derivatives of `NUMBERS`
-    JUMP = 15  # of the velocities at an impact
-    EVENT_SHIFTS = 16  # by how much an impact, a release or the end of an accumulation moves with each column
-    PULL_SLOPES = 17  # the derivatives of `PULLS`, a row for each column
-
-
 class SegmentPlan(IntEnum):
     """Columns of the plan that describes each segment of an orbit (`segments.py`)."""
 

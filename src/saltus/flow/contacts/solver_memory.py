@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from saltus.flow.kernel.memory import SolverArrays
 from saltus.taylor import jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
@@ -26,9 +27,9 @@ def rows_of_zeros(rows, columns):
 
 @jit
 def solver_arrays(own, count, columns, frictions):
-    """The arrays of `Solver`, for so many columns of a tangent."""
+    """The arrays in which impacts are solved for, for so many columns of a tangent."""
     most, numbers = max(2 * own, count + 1), own * own + count * count + count + frictions
-    return (
+    return SolverArrays(
         zeros(numbers),
         rows_of_zeros(own, own),
         rows_of_zeros(count, count),

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from saltus.errors import ParameterError
 from saltus.flow.contacts.layout import ContactColumn, FrictionColumn
 from saltus.flow.kernel.compiled import load_contacts_kernel
-from saltus.flow.kernel.layout import Where
-from saltus.flow.kernel.memory_layout import State
 from saltus.flow.kernel.structures import Program
 from saltus.flow.motion.request import MotionRequest
 from saltus.flow.one_contact.state import KernelState
@@ -19,9 +17,7 @@ from saltus.flow.one_contact.state import KernelState
 
 @dataclass(frozen=True, eq=False)
 class ContactState(KernelState):
-    """The arrays that the kernel changes; `contacts` in the columns of `ContactColumn`, then of `FrictionColumn`."""
-
-    contacts: np.ndarray = field(default_factory=lambda: np.zeros((0, len(ContactColumn)), dtype=np.int64))
+    """What the kernel changes; the `rows` are in the columns of `ContactColumn`, then of `FrictionColumn`."""
 
     @classmethod
     def at_start(cls, request: MotionRequest, run: Program) -> ContactState:
@@ -47,18 +43,17 @@ class ContactState(KernelState):
             row[ContactColumn.CLOSED] = int(gap == 0.0 and rate == 0.0)
             row[ContactColumn.SKIP] = int(gap == 0.0)
             if gap == 0.0:
-                start.state[State.COORDINATES + place] = float(contact.position)
+                start.state[place] = float(contact.position)
         for row, friction in zip(contacts[len(held) :], request.system.model.frictions, strict=True):
             rate = float(speeds[names.index(friction.coordinate)]) - float(friction.ground_speed)
             row[FrictionColumn.SLIDES] = int(np.sign(rate))
-        start.where[Where.LEAVE_BY] = 1  # no release is recorded at the start
-        return cls(start.where, start.state, start.settings, contacts)
+        start.numbers["leave_by"] = 1  # no release is recorded at the start
+        return cls(start.array, start.state, contacts)
 
-    def advance(self, run: Program, steps: Any, events: Any) -> int:
-        """Call the kernel; returns the `Status` with which it stops."""
-        return load_contacts_kernel()(self.where, self.state, self.settings, run.env, run.model, self.contacts, steps, events)
+    def _kernel(self) -> Callable[..., int]:
+        return load_contacts_kernel()
 
     @property
     def side(self) -> int:
         """1 plus the bits that `modes_of` reads: the closed contacts, and the directions in which frictions slide."""
-        return int(self.where[Where.SIDE])
+        return int(self.numbers["side"])

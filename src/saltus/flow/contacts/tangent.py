@@ -17,130 +17,129 @@ import numpy as np
 
 from saltus.flow.contacts.complementarity import acting, invert
 from saltus.flow.contacts.impacts import frozen_accumulation, restitution
-from saltus.flow.contacts.layout import APART, RELATIVE_STEP, TIED, ContactColumn, ContactPart, ImpactDetail, Solver
+from saltus.flow.contacts.layout import APART, RELATIVE_STEP, TIED, ContactColumn, ImpactDetail
 from saltus.flow.contacts.solver_memory import copy_all
-from saltus.flow.kernel.layout import Where, Work
-from saltus.flow.kernel.memory_layout import EventCode, State
-from saltus.flow.kernel.steps import expand
+from saltus.flow.kernel.memory_layout import EventCode
+from saltus.flow.kernel.steps import columns_at_event, expand
 from saltus.taylor import jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
 
 @lean_jit
-def move_columns(where, state, work, sign):
+def move_columns(motion, sign):
     """Take the columns to the event, whose instant moves (sign +1), or back from it to a fixed time (-1): u + v dt, z + a dt."""
-    own, dof, a = where[Where.OWN], where[Where.DOF], work[Work.ACCELERATIONS]
-    for j in range(where[Where.COLUMNS]):
-        shift = sign * state[State.COORDINATES + 2 * dof + j]
+    own, a = motion.own, motion.acceleration_series
+    for j in range(motion.columns):
+        shift = sign * motion.shifts[j]
         for i in range(own):
-            place = State.COORDINATES + own * (1 + j) + i
+            place = own * (1 + j) + i
             if shift != 0.0:
-                state[place] += shift * state[State.COORDINATES + dof + i]
-                state[place + dof] += shift * a[i, 0]
+                motion.coordinates[place] += shift * motion.velocities[i]
+                motion.velocities[place] += shift * a[i, 0]
 
 
 @lean_jit
-def clear_shifts(where, state):
+def clear_shifts(motion):
     """Set the shifts of the event to 0, after the columns have been taken back from it."""
-    for j in range(where[Where.COLUMNS]):
-        state[State.COORDINATES + 2 * where[Where.DOF] + j] = 0.0
+    for j in range(motion.columns):
+        motion.shifts[j] = 0.0
 
 
 @lean_jit
-def fill_slopes(where, state, env, model, solver):
+def fill_slopes(motion):
     """The derivatives of mass matrix, E and positions along each column."""
-    model[ContactPart.SLOPES](env, where[Where.PIECE], state, solver[Solver.SLOPES])
+    motion.matrix_slopes(motion.env, motion.piece, motion.state, motion.slopes)
 
 
 @lean_jit
-def slope(solver, own, count, j, place):
+def slope(motion, j, place):
     """The derivative of one of the entries of `NUMBERS` along column j."""
-    return solver[Solver.SLOPES][j * solver[Solver.NUMBERS].size + place]
+    return motion.slopes[j * motion.solver_numbers.size + place]
 
 
 @lean_jit
-def lift(where, state, model, contacts, solver, j, i):
+def lift(motion, j, i):
     """The derivative of a contact's gap along column j."""
-    own, count, coordinate = where[Where.OWN], contacts.shape[0], contacts[i, ContactColumn.COORDINATE]
-    moved = slope(solver, own, count, j, own * own + count * count + i)
-    return model[ContactPart.SIGNS][i] * (state[State.COORDINATES + own * (1 + j) + coordinate] - moved)
+    own, count, coordinate = motion.own, motion.contacts.shape[0], motion.contacts[i, ContactColumn.COORDINATE]
+    moved = slope(motion, j, own * own + count * count + i)
+    return motion.signs[i] * (motion.coordinates[own * (1 + j) + coordinate] - moved)
 
 
 @lean_jit
-def lift_rate(where, state, model, contacts, j, i):
+def lift_rate(motion, j, i):
     """The derivative of the rate of a contact's gap along column j."""
-    own, coordinate = where[Where.OWN], contacts[i, ContactColumn.COORDINATE]
-    return model[ContactPart.SIGNS][i] * state[State.COORDINATES + where[Where.DOF] + own * (1 + j) + coordinate]
+    own, coordinate = motion.own, motion.contacts[i, ContactColumn.COORDINATE]
+    return motion.signs[i] * motion.velocities[own * (1 + j) + coordinate]
 
 
 @lean_jit
-def hold_columns(where, state, contacts, solver, chosen):
+def hold_columns(motion, chosen):
     """Set the columns of coordinates at the contacts in `chosen`: they move with the contact's position and, if it is closed,
     have no velocity."""
-    own, count, dof = where[Where.OWN], contacts.shape[0], where[Where.DOF]
-    for j in range(where[Where.COLUMNS]):
+    own, count = motion.own, motion.contacts.shape[0]
+    for j in range(motion.columns):
         for i in range(count):
             if chosen >> i & 1:
-                place = State.COORDINATES + own * (1 + j) + contacts[i, ContactColumn.COORDINATE]
-                state[place] = slope(solver, own, count, j, own * own + count * count + i)
-                if contacts[i, ContactColumn.CLOSED] == 1:
-                    state[place + dof] = 0.0
+                place = own * (1 + j) + motion.contacts[i, ContactColumn.COORDINATE]
+                motion.coordinates[place] = slope(motion, j, own * own + count * count + i)
+                if motion.contacts[i, ContactColumn.CLOSED] == 1:
+                    motion.velocities[place] = 0.0
 
 
 @lean_jit
-def release_shifts(where, state, env, model, work, t, origin, i):
+def release_shifts(motion, t, i):
     """The shifts of the instant at which a reaction reaches 0, from the reaction's series."""
-    model[ContactPart.TANGENT](EventCode.RELEASE, i, t, origin, 1.0, env, where[Where.PIECE], state)
-    for j in range(where[Where.COLUMNS]):
-        state[State.COORDINATES + 2 * where[Where.DOF] + j] /= -work[Work.MARGINS][i, 1]
+    columns_at_event(motion, EventCode.RELEASE, i, t, 1.0)
+    for j in range(motion.columns):
+        motion.shifts[j] /= -motion.margin_series[i, 1]
 
 
 @lean_jit
-def release_columns(where, state, env, model, contacts, work, solver, t, origin, released):
+def release_columns(motion, t, released):
     """Take the columns to the instant at which a reaction reaches 0.
 
     `EVENT_SHIFTS` are the shifts of this instant, nan where another reaction reaches 0 at the same instant with another shift.
     """
-    first, shifts = State.COORDINATES + 2 * where[Where.DOF], solver[Solver.EVENT_SHIFTS]
-    expand(where, state, env, model, work, t, origin, 1.0, 1)
-    release_shifts(where, state, env, model, work, t, origin, released)
-    for j in range(where[Where.COLUMNS]):
-        shifts[j] = state[first + j]
-    for i in range(contacts.shape[0]):
-        if i != released and contacts[i, ContactColumn.CLOSED] == 1 and abs(work[Work.MARGINS][i, 0]) <= TIED:
-            release_shifts(where, state, env, model, work, t, origin, i)
-            for j in range(where[Where.COLUMNS]):
-                if abs(state[first + j] - shifts[j]) > APART * (abs(state[first + j]) + abs(shifts[j])):
+    shifts = motion.event_shifts
+    expand(motion, t, 1.0, 1)
+    release_shifts(motion, t, released)
+    for j in range(motion.columns):
+        shifts[j] = motion.shifts[j]
+    for i in range(motion.contacts.shape[0]):
+        if i != released and motion.contacts[i, ContactColumn.CLOSED] == 1 and abs(motion.margin_series[i, 0]) <= TIED:
+            release_shifts(motion, t, i)
+            for j in range(motion.columns):
+                if abs(motion.shifts[j] - shifts[j]) > APART * (abs(motion.shifts[j]) + abs(shifts[j])):
                     shifts[j] = math.nan
-    release_shifts(where, state, env, model, work, t, origin, released)
-    move_columns(where, state, work, 1.0)
+    release_shifts(motion, t, released)
+    move_columns(motion, 1.0)
 
 
 @lean_jit
-def closing_columns(where, state, env, model, contacts, work, solver, t, origin, hit):
+def closing_columns(motion, t, hit):
     """Take the columns to the instant at which the contacts in `hit` close; returns an `ImpactDetail`."""
-    detail, first = ImpactDetail.REGULAR, State.COORDINATES + 2 * where[Where.DOF]
-    expand(where, state, env, model, work, t, origin, 1.0, 0)
-    fill_slopes(where, state, env, model, solver)
-    for j in range(where[Where.COLUMNS]):
+    detail = ImpactDetail.REGULAR
+    expand(motion, t, 1.0, 0)
+    fill_slopes(motion)
+    for j in range(motion.columns):
         known = False
-        for i in range(contacts.shape[0]):
+        for i in range(motion.contacts.shape[0]):
             if not hit >> i & 1:
                 continue
-            rate = solver[Solver.RATES][i]
+            rate = motion.rates[i]
             if rate >= 0.0:
                 return ImpactDetail.NO_SPEED
-            shift = -lift(where, state, model, contacts, solver, j, i) / rate
-            if known and abs(shift - state[first + j]) > APART * (abs(shift) + abs(state[first + j])):
+            shift = -lift(motion, j, i) / rate
+            if known and abs(shift - motion.shifts[j]) > APART * (abs(shift) + abs(motion.shifts[j])):
                 shift, detail = math.nan, ImpactDetail.APART
-            state[first + j], known = shift, True
-    move_columns(where, state, work, 1.0)
+            motion.shifts[j], known = shift, True
+    move_columns(motion, 1.0)
     return detail
 
 
 @jit
-def impulse_columns(where, state, env, model, contacts, solver, acts, chosen):
+def impulse_columns(motion, acts, chosen):
     """Differentiate an impact at which the contacts in `acts` have impulses and those in `chosen` enter its law.
 
     M w = S J with the jump w of the velocities; the rates of the acting gaps after it are -E v-, or 0 if `chosen` is empty:
@@ -149,176 +148,174 @@ def impulse_columns(where, state, env, model, contacts, solver, acts, chosen):
 
     `solver` holds the coupling, the inverse of M, the rates before the impact (in `GAPS`) and w (in `JUMP`).
     """
-    own, count, signs, dof = where[Where.OWN], contacts.shape[0], model[ContactPart.SIGNS], where[Where.DOF]
-    inverse, twist, right = solver[Solver.INVERSE], np.zeros(own), solver[Solver.RIGHT]
-    fill_slopes(where, state, env, model, solver)
-    for j in range(where[Where.COLUMNS]):
+    own, count, signs = motion.own, motion.contacts.shape[0], motion.signs
+    inverse, twist, right = motion.inverse, np.zeros(own), motion.right
+    fill_slopes(motion)
+    for j in range(motion.columns):
         for a in range(own):  # M^-1 dM w
             twist[a] = 0.0
             for b in range(own):
                 for c in range(own):
-                    twist[a] += inverse[a, b] * slope(solver, own, count, j, own * b + c) * solver[Solver.JUMP][c]
+                    twist[a] += inverse[a, b] * slope(motion, j, own * b + c) * motion.jump[c]
         for i in range(count):
-            right[i] = lift_rate(where, state, model, contacts, j, i) - signs[i] * twist[contacts[i, ContactColumn.COORDINATE]]
+            right[i] = lift_rate(motion, j, i) - signs[i] * twist[motion.contacts[i, ContactColumn.COORDINATE]]
             for k in range(count):
                 if chosen >> k & 1:
-                    right[i] += restitution(solver, own, count, i, k) * lift_rate(where, state, model, contacts, j, k)
-                    right[i] += slope(solver, own, count, j, own * own + count * i + k) * solver[Solver.GAPS][k]
-        acting(solver[Solver.COUPLING], right, count, acts, solver[Solver.BLOCK], solver[Solver.TRIED])
+                    right[i] += restitution(motion, i, k) * lift_rate(motion, j, k)
+                    right[i] += slope(motion, j, own * own + count * i + k) * motion.gaps[k]
+        acting(motion.coupling, right, count, acts, motion.block, motion.tried)
         for a in range(own):
-            place = State.COORDINATES + dof + own * (1 + j) + a
-            state[place] -= twist[a]
+            place = own * (1 + j) + a
+            motion.velocities[place] -= twist[a]
             for i in range(count):
-                state[place] += inverse[a, contacts[i, ContactColumn.COORDINATE]] * signs[i] * solver[Solver.TRIED][i]
+                motion.velocities[place] += inverse[a, motion.contacts[i, ContactColumn.COORDINATE]] * signs[i] * motion.tried[i]
 
 
 @lean_jit
-def note_velocities(where, state, solver, before):
+def note_velocities(motion, before):
     """Put the velocities plus `before` times the present `JUMP` into `JUMP`: with 0 the velocities before an impact, then, with
     -1, their jump."""
-    for a in range(where[Where.OWN]):
-        velocity = state[State.COORDINATES + where[Where.DOF] + a]
-        solver[Solver.JUMP][a] = velocity if before == 0.0 else velocity + before * solver[Solver.JUMP][a]
+    for a in range(motion.own):
+        velocity = motion.velocities[a]
+        motion.jump[a] = velocity if before == 0.0 else velocity + before * motion.jump[a]
 
 
 @lean_jit
-def note_shifts(where, state, contacts, events, shifts, first):
+def note_shifts(motion, shifts):
     """Record with the last event its shift along each column, which are the numbers of `shifts` from `first` on."""
-    for j in range(where[Where.COLUMNS]):
-        events[1][where[Where.EVENTS] - 1, 1 + 2 * where[Where.OWN] + contacts.shape[0] + j] = shifts[first + j]
+    for j in range(motion.columns):
+        motion.event_values[motion.recorded_events - 1, 1 + 2 * motion.own + motion.contacts.shape[0] + j] = shifts[j]
 
 
 @lean_jit
-def pull_slopes(where, state, env, model, contacts, work, solver, t, origin):
+def pull_slopes(motion, t):
     """Fill `PULL_SLOPES`, the derivatives of the gaps' second derivatives with all contacts open, at an event.
 
     All coordinates must be free, and the columns must have been taken to the event.
     """
-    own, a, first = where[Where.OWN], work[Work.ACCELERATIONS], State.COORDINATES + 2 * where[Where.DOF]
-    expand(where, state, env, model, work, t, origin, 1.0, 0)
-    move_columns(where, state, work, -1.0)
-    expand(where, state, env, model, work, t, origin, 1.0, 2)
-    for j in range(where[Where.COLUMNS]):
-        for i in range(contacts.shape[0]):
-            coordinate = contacts[i, ContactColumn.COORDINATE]
-            change = a[own * (1 + j) + coordinate, 0] + state[first + j] * a[coordinate, 1]
-            solver[Solver.PULL_SLOPES][j, i] = model[ContactPart.SIGNS][i] * change
-    move_columns(where, state, work, 1.0)
+    own, a = motion.own, motion.acceleration_series
+    expand(motion, t, 1.0, 0)
+    move_columns(motion, -1.0)
+    expand(motion, t, 1.0, 2)
+    for j in range(motion.columns):
+        for i in range(motion.contacts.shape[0]):
+            coordinate = motion.contacts[i, ContactColumn.COORDINATE]
+            change = a[own * (1 + j) + coordinate, 0] + motion.shifts[j] * a[coordinate, 1]
+            motion.pull_slopes[j, i] = motion.signs[i] * change
+    move_columns(motion, 1.0)
 
 
 @lean_jit
-def perturb(where, state, model, contacts, solver, j, step):
+def perturb(motion, j, step):
     """Move all quantities on which the duration of an accumulation depends by a step along column j; gaps and rates that are 0
     stay 0."""
-    own, count, signs = where[Where.OWN], contacts.shape[0], model[ContactPart.SIGNS]
-    numbers = solver[Solver.NUMBERS]
+    own, count, signs = motion.own, motion.contacts.shape[0], motion.signs
+    numbers = motion.solver_numbers
     for i in range(count):
-        if solver[Solver.GAPS][i] != 0.0:
-            solver[Solver.GAPS][i] += step * lift(where, state, model, contacts, solver, j, i)
-        if solver[Solver.RATES][i] != 0.0:
-            solver[Solver.RATES][i] += step * lift_rate(where, state, model, contacts, j, i)
-        solver[Solver.PULLS][i] += step * solver[Solver.PULL_SLOPES][j, i]
+        if motion.gaps[i] != 0.0:
+            motion.gaps[i] += step * lift(motion, j, i)
+        if motion.rates[i] != 0.0:
+            motion.rates[i] += step * lift_rate(motion, j, i)
+        motion.pulls[i] += step * motion.pull_slopes[j, i]
     for k in range(own * own + count * count):
-        numbers[k] += step * slope(solver, own, count, j, k)
-    invert(numbers, own, solver[Solver.BLOCK], solver[Solver.INVERSE])
+        numbers[k] += step * slope(motion, j, k)
+    invert(numbers, own, motion.block, motion.inverse)
     for i in range(count):
         for k in range(count):
-            entry = solver[Solver.INVERSE][contacts[i, ContactColumn.COORDINATE], contacts[k, ContactColumn.COORDINATE]]
-            solver[Solver.COUPLING][i, k] = signs[i] * signs[k] * entry
+            entry = motion.inverse[motion.contacts[i, ContactColumn.COORDINATE], motion.contacts[k, ContactColumn.COORDINATE]]
+            motion.coupling[i, k] = signs[i] * signs[k] * entry
 
 
 @jit
-def accumulation_shifts(where, state, env, model, contacts, work, solver, near, t, origin):
+def accumulation_shifts(motion, near, t):
     """Add to `EVENT_SHIFTS`, which hold the shifts of the last impact, those of the time left until the accumulation ends:
     central differences of this time over the gaps, rates, accelerations and numbers."""
-    own, count = where[Where.OWN], contacts.shape[0]
-    fill_slopes(where, state, env, model, solver)
-    pull_slopes(where, state, env, model, contacts, work, solver, t, origin)
-    gaps, rates, pulls = solver[Solver.GAPS].copy(), solver[Solver.RATES].copy(), solver[Solver.PULLS].copy()
-    numbers = solver[Solver.NUMBERS].copy()
-    for j in range(where[Where.COLUMNS]):
+    own, count = motion.own, motion.contacts.shape[0]
+    fill_slopes(motion)
+    pull_slopes(motion, t)
+    gaps, rates, pulls = motion.gaps.copy(), motion.rates.copy(), motion.pulls.copy()
+    numbers = motion.solver_numbers.copy()
+    for j in range(motion.columns):
         largest = 0.0  # the largest relative change along the column
         for i in range(count):
             if near >> i & 1:
-                largest = max(largest, abs(solver[Solver.PULL_SLOPES][j, i] / pulls[i]))
+                largest = max(largest, abs(motion.pull_slopes[j, i] / pulls[i]))
                 if rates[i] != 0.0:
-                    largest = max(largest, abs(lift_rate(where, state, model, contacts, j, i) / rates[i]))
+                    largest = max(largest, abs(lift_rate(motion, j, i) / rates[i]))
                 if gaps[i] != 0.0:
-                    largest = max(largest, abs(lift(where, state, model, contacts, solver, j, i) / gaps[i]))
+                    largest = max(largest, abs(lift(motion, j, i) / gaps[i]))
         for k in range(own * own + count * count):
-            largest = max(largest, abs(slope(solver, own, count, j, k)))
+            largest = max(largest, abs(slope(motion, j, k)))
         change, step = 0.0, RELATIVE_STEP / max(largest, 1e-300)
         for sign in (1.0, -1.0):
-            perturb(where, state, model, contacts, solver, j, sign * step)
-            left = frozen_accumulation(solver, own, count, near, np.inf)
+            perturb(motion, j, sign * step)
+            left = frozen_accumulation(motion, near, np.inf)
             change += sign * (left if left >= 0.0 else math.nan)
-            copy_all(gaps, solver[Solver.GAPS])
-            copy_all(rates, solver[Solver.RATES])
-            copy_all(pulls, solver[Solver.PULLS])
-            copy_all(numbers, solver[Solver.NUMBERS])
-        solver[Solver.EVENT_SHIFTS][j] += 0.5 * change / step if largest > 0.0 else 0.0
-    perturb(where, state, model, contacts, solver, 0, 0.0)
+            copy_all(gaps, motion.gaps)
+            copy_all(rates, motion.rates)
+            copy_all(pulls, motion.pulls)
+            copy_all(numbers, motion.solver_numbers)
+        motion.event_shifts[j] += 0.5 * change / step if largest > 0.0 else 0.0
+    perturb(motion, 0, 0.0)
 
 
 @lean_jit
-def rest_columns(where, state, env, model, contacts, solver, near):
+def rest_columns(motion, near):
     """The columns at the end of an accumulation, where impulses on the contacts in `near` alone take their speeds."""
-    own = where[Where.OWN]
+    own = motion.own
     for a in range(own):
-        solver[Solver.JUMP][a] = 0.0
-        for i in range(contacts.shape[0]):
-            gain = solver[Solver.INVERSE][a, contacts[i, ContactColumn.COORDINATE]] * model[ContactPart.SIGNS][i]
-            solver[Solver.JUMP][a] += gain * solver[Solver.IMPULSES][i]
-    impulse_columns(where, state, env, model, contacts, solver, near, 0)
-    hold_columns(where, state, contacts, solver, near)
+        motion.jump[a] = 0.0
+        for i in range(motion.contacts.shape[0]):
+            gain = motion.inverse[a, motion.contacts[i, ContactColumn.COORDINATE]] * motion.signs[i]
+            motion.jump[a] += gain * motion.impulses[i]
+    impulse_columns(motion, near, 0)
+    hold_columns(motion, near)
 
 
 @lean_jit
-def project(where, state, model, contacts, solver, closed, first, right):
-    """Add M^-1 S z to the `own` numbers of the state from `first` on, with the z for which the gaps in `closed` change by
-    -`right`."""
-    own, count, signs = where[Where.OWN], contacts.shape[0], model[ContactPart.SIGNS]
-    acting(solver[Solver.COUPLING], right, count, closed, solver[Solver.BLOCK], solver[Solver.TRIED])
+def project(motion, closed, vector):
+    """Add M^-1 S z to a vector, with the z for which the gaps in `closed` change by -`right`."""
+    own, count, signs = motion.own, motion.contacts.shape[0], motion.signs
+    acting(motion.coupling, motion.right, count, closed, motion.block, motion.tried)
     for a in range(own):
         for i in range(count):
-            gain = solver[Solver.INVERSE][a, contacts[i, ContactColumn.COORDINATE]] * signs[i]
-            state[first + a] += gain * solver[Solver.TRIED][i]
+            gain = motion.inverse[a, motion.contacts[i, ContactColumn.COORDINATE]] * signs[i]
+            vector[a] += gain * motion.tried[i]
 
 
 @jit
-def fall_back(where, state, env, model, contacts, work, solver, t, origin, closed, j):
+def fall_back(motion, t, closed, j):
     """Column j for a start at closed contacts, see `start_columns`."""
-    own, count, dof, right = where[Where.OWN], contacts.shape[0], where[Where.DOF], solver[Solver.RIGHT]
-    u = State.COORDINATES + own * (1 + j)
-    z, given = u + dof, state[u : u + own].copy()
-    rates = state[z : z + own].copy()
+    own, count, right = motion.own, motion.contacts.shape[0], motion.right
+    u, z = motion.coordinates[own * (1 + j) : own * (2 + j)], motion.velocities[own * (1 + j) : own * (2 + j)]
+    given, rates = u.copy(), z.copy()
     for i in range(count):
-        right[i] = lift(where, state, model, contacts, solver, j, i)
-    project(where, state, model, contacts, solver, closed, u, right)
-    after, lost = state[u : u + own].copy(), np.zeros(own)
+        right[i] = lift(motion, j, i)
+    project(motion, closed, u)
+    after, lost = u.copy(), np.zeros(own)
     fallen = given - after  # K h
     for sign in (0.5, -0.5):  # the odd parts of a_v K h and M' K h, without the effect of parameters
         for a in range(own):
-            state[u + a], state[z + a] = 0.0, math.copysign(1.0, sign) * fallen[a]
-        expand(where, state, env, model, work, t, origin, 1.0, 0)
+            u[a], z[a] = 0.0, math.copysign(1.0, sign) * fallen[a]
+        expand(motion, t, 1.0, 0)
         for a in range(own):
-            lost[a] += sign * work[Work.ACCELERATIONS][own * (1 + j) + a, 0]
-            state[u + a] = math.copysign(1.0, sign) * state[State.COORDINATES + dof + a]
-        fill_slopes(where, state, env, model, solver)
+            lost[a] += sign * motion.acceleration_series[own * (1 + j) + a, 0]
+            u[a] = math.copysign(1.0, sign) * motion.velocities[a]
+        fill_slopes(motion)
         for a in range(own):
             for b in range(own):
                 for c in range(own):
-                    lost[a] += sign * solver[Solver.INVERSE][a, b] * slope(solver, own, count, j, own * b + c) * fallen[c]
+                    lost[a] += sign * motion.inverse[a, b] * slope(motion, j, own * b + c) * fallen[c]
     for a in range(own):
-        state[u + a], state[z + a] = after[a], rates[a] - lost[a]
+        u[a], z[a] = after[a], rates[a] - lost[a]
     for i in range(count):
-        right[i] = lift_rate(where, state, model, contacts, j, i)
-    project(where, state, model, contacts, solver, closed, z, right)
-    fill_slopes(where, state, env, model, solver)
+        right[i] = lift_rate(motion, j, i)
+    project(motion, closed, z)
+    fill_slopes(motion)
 
 
 @lean_jit
-def start_columns(where, state, env, model, contacts, work, solver, t, origin, closed):
+def start_columns(motion, t, closed):
     """The one-sided derivatives of a motion that starts with contacts closed, to the side on which their gaps open.
 
     A small gap h closes, and its bounces end, within a time of the order of sqrt(h). The impulses of these contacts do not change
@@ -328,22 +325,22 @@ def start_columns(where, state, env, model, contacts, work, solver, t, origin, c
 
     where K' is the time derivative of K. Where impacts lose nothing the bounces never end, and there is no derivative.
     """
-    own, count, dof = where[Where.OWN], contacts.shape[0], where[Where.DOF]
-    fill_slopes(where, state, env, model, solver)
-    for j in range(where[Where.COLUMNS]):
+    own, count = motion.own, motion.contacts.shape[0]
+    fill_slopes(motion)
+    for j in range(motion.columns):
         lifted, lossless = 0.0, False
         for i in range(count):
             if closed >> i & 1:
-                opened = abs(lift(where, state, model, contacts, solver, j, i))
-                size = max(opened, abs(lift_rate(where, state, model, contacts, j, i)))
+                opened = abs(lift(motion, j, i))
+                size = max(opened, abs(lift_rate(motion, j, i)))
                 lifted = max(lifted, size)
-                lossless = lossless or (size > 0.0 and restitution(solver, own, count, i, i) >= 1.0)
+                lossless = lossless or (size > 0.0 and restitution(motion, i, i) >= 1.0)
         if lifted == 0.0:
             continue
-        place = State.COORDINATES + own * (1 + j)
+        place = own * (1 + j)
         if lossless:
             for a in range(own):
-                state[place + a] = state[place + dof + a] = math.nan
+                motion.coordinates[place + a] = motion.velocities[place + a] = math.nan
             continue
-        fall_back(where, state, env, model, contacts, work, solver, t, origin, closed, j)
-    hold_columns(where, state, contacts, solver, closed)
+        fall_back(motion, t, closed, j)
+    hold_columns(motion, closed)

@@ -17,8 +17,8 @@ from saltus.flow.contacts import kernel as contacts_kernel
 from saltus.flow.contacts import layout as contact_layout
 from saltus.flow.contacts import segments as contact_segments
 from saltus.flow.contacts.one_free import OneFree, equations_of_one_free
-from saltus.flow.kernel import event_derivatives, function_types, layout, roots, steps
-from saltus.flow.kernel.memory_layout import State
+from saltus.flow.kernel import event_derivatives, function_types, layout, loop, memory, roots, steps
+from saltus.flow.kernel.memory import ContactsFunctions, OneContactFunctions
 from saltus.flow.one_contact import chatter, impacts, kernel, segments, sides
 from saltus.taylor import (
     SCALAR,
@@ -50,13 +50,14 @@ _SIGNATURES = f"""import math
 import numpy as np
 
 from saltus.flow.kernel.function_types import *
+from saltus.flow.kernel.memory import *
 from saltus.taylor.numba_types import by_reference
 from saltus.taylor.private_numba import cached_jit, inline_jit, jit, lean_jit
-# types of {digest(source_of(function_types))}
+# types of {digest(source_of(function_types), source_of(memory))}
 """
 ENV = {"parameter": ("parameters", 0), "constant": ("constants", 0), "record": ("table", 0)}
 LEAVES = ENV | {"time": ("t", 0), "origin": ("origin", 0), "side": ("side", 0)}
-HERE = {"coordinate": ("state", State.COORDINATES.value)}  # in the kernel's state
+HERE = {"coordinate": ("state", 0)}  # in the kernel's state
 
 
 class Sizes(NamedTuple):
@@ -85,7 +86,7 @@ class Structure:
     signs: tuple[int, ...] = ()  # of the contacts, if there are several
     frictions: int = 0
 
-    def prepare(self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+    def prepare(self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray]) -> tuple[tuple[Any, ...], Any]:
         """The arguments `env` and `model` of the kernel for given numbers (see `one_contact/kernel.py`)."""
         constants, geometry = np.zeros(self.constant_count), np.zeros(3)
         fill_constants, fill_geometry = self._fill
@@ -93,10 +94,12 @@ class Structure:
         if self.several:
             modes = np.append(np.zeros(self.frictions), np.ones(self.sizes.own))
             env = (np.append(parameters, modes), constants, *records)
-            return env, (*self.functions[:2], np.array(self.signs, dtype=float), *self.functions[2:])
+            series, matrices, slopes, tangent = self.functions
+            return env, ContactsFunctions(series, matrices, np.array(self.signs, dtype=float), slopes, tangent)
         env = (parameters, constants, *records)
         fill_geometry(env, geometry)
-        return env, (*self.functions[:4], geometry, self.functions[4])
+        series, contact_series, reset, damping, tangent = self.functions
+        return env, OneContactFunctions(series, contact_series, reset, damping, geometry, tangent)
 
     @cached_property
     def _fill(self) -> tuple[Callable[..., None], ...]:
@@ -112,13 +115,13 @@ def load_kernel() -> Callable[..., int]:
 
 def kernel_module() -> ModuleType:
     """The module of the scalar kernel."""
-    return load_module("kernel", _text(layout, roots, steps, impacts, chatter, kernel))
+    return load_module("kernel", _text(layout, roots, steps, impacts, chatter, kernel, loop))
 
 
 @cache
 def load_contacts_kernel() -> Callable[..., int]:
-    """The kernel for models with several contacts, `advance_contacts` of `contacts/kernel.py`."""
-    return entry_point(contacts_module().advance_contacts)
+    """The kernel for models with several contacts, `advance` with the functions of `contacts/kernel.py`."""
+    return entry_point(contacts_module().advance)
 
 
 def contacts_module() -> ModuleType:
@@ -133,7 +136,8 @@ def contacts_module() -> ModuleType:
         choice,
         closings,
     )
-    return load_module("contacts", _text(layout, roots, steps, *parts, decisions, contacts_kernel))
+    text = _text(layout, roots, steps, *parts, decisions, contacts_kernel, loop)
+    return load_module("contacts", text.replace("(ADVANCE)", "(ADVANCE_CONTACTS)"))
 
 
 @cache
@@ -289,9 +293,9 @@ def _at_impact(name: str, arguments: tuple[str, ...], roots: list[Expr], known: 
 
 
 def _tangent(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
-    """The function that transforms the tangent's columns, in the kernel's state (see `State`), at each kind of event."""
-    count, first = len(trace.acceleration), State.COORDINATES.value
-    starts = {"coordinate": first, "velocity": first + count, "shift": first + 2 * count}
+    """The function that transforms the tangent's columns, in the kernel's state, at each kind of event."""
+    count = len(trace.acceleration)
+    starts = {"coordinate": 0, "velocity": count, "shift": 2 * count}
     state = {op: ("state", start) for op, start in starts.items()}
     cases = []
     for kind, detail, changes in event_derivatives.changes(trace) if trace.columns else []:

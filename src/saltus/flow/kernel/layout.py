@@ -46,69 +46,6 @@ class GrazingDetail(IntEnum):
     TRIPLE = 1  # a triple root: the motion goes on from rest at the contact
 
 
-class Where(IntEnum):
-    """Places in the array `where` of whole numbers, which together with `state` describes where a motion is."""
-
-    PERIOD = 0  # the forcing period
-    MODE = 1
-    SIDE = 2
-    SKIP = 3  # order of the gap's known zero at the start of an arc; the side just released in CONTACT from rest
-    PIECE = 4  # of the records
-    STEPS = 5  # recorded in the buffer
-    EVENTS = 6  # recorded in the buffer
-    LAST_PERIOD = 7  # in which the motion ends
-    ORDER = 8  # of the Taylor series
-    DENSE = 9  # whether steps are recorded
-    LEAVE_BY = 10  # the side that the caller has chosen for a motion from rest at the contact that is not unique; or 0
-    HELD = 11  # whether the motion was at rest or in chatter before
-    DOF = 12  # coordinates that are followed, OWN (1 + COLUMNS)
-    MARGINS = 13  # the number of margins at which the motion stops
-    ROWS = 14  # of the workspace
-    SIDES = 15  # of the contact
-    CHECKED = 16  # whether steps are checked, because the structure has functions with steep changes that a series may miss
-    UNTIL_SMOOTH = 17  # whether to return as soon as the motion is smooth again (see `lanes/driver.py`)
-    OWN = 18  # the model's own coordinates
-    COLUMNS = 19  # of the tangent
-
-
-# The places of `Structure.sizes`, in their order.
-STRUCTURE_SIZES = [Where.DOF, Where.MARGINS, Where.ROWS, Where.SIDES, Where.CHECKED, Where.OWN, Where.COLUMNS]
-
-
-class Setting(IntEnum):
-    """Places in the array `settings`."""
-
-    LENGTH = 0  # of a forcing period
-    END = 1  # of the motion, as a time within its last forcing period
-    TOLERANCE = 2
-    HORIZON = 3  # for the scalar steps of a lane, which end with its forcing period: the local time at which its motion ends
-
-
-class Work(IntEnum):
-    """Places in the tuple `work` of arrays: Taylor coefficients of a step and the space to compute them."""
-
-    POSITIONS = 0
-    VELOCITIES = 1
-    ACCELERATIONS = 2
-    GAP = 3
-    MARGINS = 4
-    RECURRENCES = 5
-    POLYNOMIAL = 6  # scaled to a step of 1
-    CONTACT = 7  # contact accelerations of both sides
-    STEP_END = 8  # the first five again, evaluated at the end of a step
-
-
-class ModelPart(IntEnum):
-    """Places in the tuple `model`: the functions of a structure that the kernel calls, and the geometry of its contact."""
-
-    SERIES = 0
-    CONTACT_SERIES = 1
-    RESET = 2
-    CONTACT_DAMPING = 3
-    GEOMETRY = 4
-    TANGENT = 5
-
-
 class Geometry(IntEnum):
     """Places in the array of a structure's geometry: the coordinate at contact, and how the gap changes with it on each side."""
 
@@ -139,8 +76,6 @@ class SegmentColumn(IntEnum):
 
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
-
-WHERE_LENGTH, SETTING_COUNT = 20, 4  # lengths of the arrays `where` and `settings`
 
 # The length of a step.
 SAFETY = 0.9  # The error of a step is then a tenth of tol, and the energy drifts by less than 1e-12 in 1000 periods.

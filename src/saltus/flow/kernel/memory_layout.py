@@ -40,18 +40,6 @@ class ReleaseDetail(IntEnum):
     AT_NONE = 2  # neither, so that the release has no derivative
 
 
-class State(IntEnum):
-    """Places in the array `state` of the scalar kernel.
-
-    From COORDINATES on it holds all coordinates, including those of the tangent's columns, then their velocities, then for each
-    column the shift of the last event.
-    """
-
-    TIME = 0  # within the forcing period
-    CHATTER_SPEED = 1  # of the gap, while impacts without loss are averaged
-    COORDINATES = 2
-
-
 class LaneSlot(IntEnum):
     """The slots of the lanes' memory that the generated functions read or write besides the parts of `LanePart`."""
 

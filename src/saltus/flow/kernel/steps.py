@@ -9,8 +9,9 @@ import math
 
 import numpy as np
 
-from saltus.flow.kernel.layout import DEFECT, GAP, SAFETY, SMALLEST, ModelPart, Setting, Where
-from saltus.flow.kernel.memory_layout import State
+from saltus.flow.kernel.layout import DEFECT, GAP, ROUGHER, SAFETY, SMALLEST
+from saltus.flow.kernel.memory import StateArrays, StepArrays
+from saltus.flow.kernel.memory_layout import EventCode
 from saltus.flow.kernel.roots import horner
 from saltus.taylor import jit, lean_jit
 
@@ -18,35 +19,48 @@ from saltus.taylor import jit, lean_jit
 
 
 @jit
-def work_arrays(where):
-    """The arrays of a step, in the places of `Work`."""
-    dof, order, margins = where[Where.DOF], where[Where.ORDER], max(where[Where.MARGINS], 1)
+def step_arrays(numbers):
+    """The arrays of a step."""
+    dof, order, margins = numbers.dof, numbers.order, max(numbers.margin_count, 1)
     count = order + 2
     rows = np.zeros((3 * dof + margins + 4, count))  # one piece of memory for each shape: lanes ask for them at every slow impact
     pairs = np.zeros((3 * dof + margins + 1, 2))
-    return (
+    return StepArrays(
         rows[:dof],
         rows[dof : 2 * dof],
         rows[2 * dof : 3 * dof],
         rows[3 * dof],
         rows[3 * dof + 4 :],
-        np.zeros((where[Where.ROWS], order + 6)),
+        np.zeros((numbers.workspace_rows, order + 6)),
         rows[3 * dof + 1],
         rows[3 * dof + 2 : 3 * dof + 4],
         (pairs[:dof], pairs[dof : 2 * dof], pairs[2 * dof : 3 * dof], pairs[3 * dof], pairs[3 * dof + 1 :]),
     )
 
 
+@jit
+def state_arrays(numbers, state):
+    """The parts of the state."""
+    dof = numbers.dof
+    return StateArrays(state, state[:dof], state[dof : 2 * dof], state[2 * dof :])
+
+
 @lean_jit
-def expand(where, state, env, model, work, t, origin, side, order):
+def columns_at_event(motion, kind, detail, t, side):
+    """Transform the tangent's columns at an event, and put the shifts of the event into the state."""
+    motion.tangent(kind, detail, t, motion.origin, side, motion.env, motion.piece, motion.state)
+
+
+@lean_jit
+def expand(motion, t, side, order):
     """Expand the state in its Taylor series at time `t`; returns the size of the model's own part of the state."""
-    q, v, a, g, m, w, _, _, _ = work
-    first_q, first_v, size = State.COORDINATES, State.COORDINATES + where[Where.DOF], 0.0
-    for i in range(where[Where.DOF]):
-        q[i, 0], v[i, 0] = state[first_q + i], state[first_v + i]
-        if i < where[Where.OWN]:
+    q, v, a, size = motion.coordinate_series, motion.velocity_series, motion.acceleration_series, 0.0
+    g, m, w = motion.gap_series, motion.margin_series, motion.recurrences
+    for i in range(motion.dof):
+        q[i, 0], v[i, 0] = motion.coordinates[i], motion.velocities[i]
+        if i < motion.own:
             size = max(size, abs(q[i, 0]), abs(v[i, 0]))
-    model[ModelPart.SERIES](t, origin, side, env, where[Where.PIECE], q, v, a, g, m, w, order)
+    motion.series(t, motion.origin, side, motion.env, motion.piece, q, v, a, g, m, w, order)
     return size
 
 
@@ -90,68 +104,69 @@ def step_size(coefficients, order, size, tol):
 
 
 @lean_jit
-def leaps(where, env, model, work, t, origin, side, h, size, tol):
+def leaps(motion, t, side, h, size):
     """Whether a step passes a feature of the acceleration that its series cannot show, such as the bend of a saturated tanh,
     whose coefficients are below rounding far away from it.
 
     It is noticed because the model's acceleration at the end of the step then differs from that of the series.
     """
-    q, v, a, _, _, w, _, _, (q_end, v_end, a_end, g_end, m_end) = work
-    order = where[Where.ORDER]
-    for i in range(where[Where.DOF]):
+    q, v, a, w = motion.coordinate_series, motion.velocity_series, motion.acceleration_series, motion.recurrences
+    q_end, v_end, a_end, g_end, m_end = motion.step_end
+    order = motion.order
+    for i in range(motion.dof):
         q_end[i, 0], v_end[i, 0] = horner(q[i], order, h), horner(v[i], order, h)
-    model[ModelPart.SERIES](t + h, origin, side, env, where[Where.PIECE], q_end, v_end, a_end, g_end, m_end, w, 0)
+    motion.series(t + h, motion.origin, side, motion.env, motion.piece, q_end, v_end, a_end, g_end, m_end, w, 0)
     defect = 0.0
-    for i in range(where[Where.OWN]):
+    for i in range(motion.own):
         defect = max(defect, abs(a_end[i, 0] - horner(a[i], order, h)))
-    return defect > DEFECT * tol * max(size, SMALLEST) / h
+    return defect > DEFECT * motion.tolerance * max(size, SMALLEST) / h
 
 
 @lean_jit
-def move(where, state, q, v, tau):
+def move(motion, tau):
     """Take the state at `tau` from the series of a step; returns whether the model's own part of it is finite."""
-    first_q, first_v, order, finite = State.COORDINATES, State.COORDINATES + where[Where.DOF], where[Where.ORDER], True
-    for i in range(where[Where.DOF]):
-        state[first_q + i], state[first_v + i] = horner(q[i], order, tau), horner(v[i], order, tau)
-        if i < where[Where.OWN]:
-            finite = finite and math.isfinite(state[first_q + i]) and math.isfinite(state[first_v + i])
+    q, v, order, finite = motion.coordinate_series, motion.velocity_series, motion.order, True
+    for i in range(motion.dof):
+        motion.coordinates[i], motion.velocities[i] = horner(q[i], order, tau), horner(v[i], order, tau)
+        if i < motion.own:
+            finite = finite and math.isfinite(motion.coordinates[i]) and math.isfinite(motion.velocities[i])
     return finite
 
 
 @lean_jit
-def record_event(where, events, kind, side, detail, t, before, after):
+def record_event(motion, kind, detail, t, before, after):
     """Append an event: (period, kind, side, detail) and (local time, velocity before, velocity after, shifts)."""
-    labels, values = events
-    i = where[Where.EVENTS]
-    labels[i, 0], labels[i, 1], labels[i, 2], labels[i, 3] = where[Where.PERIOD], kind, side, detail
+    labels, values = motion.event_labels, motion.event_values
+    i, side = motion.recorded_events, 0 if kind == EventCode.RESTING else motion.side
+    labels[i, 0], labels[i, 1], labels[i, 2], labels[i, 3] = motion.period, kind, side, detail
     values[i, 0], values[i, 1], values[i, 2] = t, before, after
-    for j in range(where[Where.COLUMNS]):
+    for j in range(motion.columns):
         values[i, 3 + j] = math.nan  # until `record_shift` sets it
-    where[Where.EVENTS] = i + 1
+    motion.recorded_events = i + 1
 
 
 @lean_jit
-def record_shift(where, state, events):
+def record_shift(motion):
     """Record with the last event its shift along each column, which `tangent` has put into the state."""
-    for j in range(where[Where.COLUMNS]):
-        events[1][where[Where.EVENTS] - 1, 3 + j] = state[State.COORDINATES + 2 * where[Where.DOF] + j]
+    for j in range(motion.columns):
+        motion.event_values[motion.recorded_events - 1, 3 + j] = motion.shifts[j]
 
 
 @lean_jit
-def forget(where, state):
+def forget(motion):
     """Set the tangent to nan: there are no derivatives from here on."""
-    coordinates, velocities = State.COORDINATES, State.COORDINATES + where[Where.DOF]
-    for i in range(where[Where.OWN], where[Where.DOF]):
-        state[coordinates + i] = state[velocities + i] = math.nan
-    for j in range(where[Where.COLUMNS]):
-        state[velocities + where[Where.DOF] + j] = math.nan
+    for i in range(motion.own, motion.dof):
+        motion.coordinates[i] = motion.velocities[i] = math.nan
+    for j in range(motion.columns):
+        motion.shifts[j] = math.nan
 
 
 @lean_jit
-def column_step(where, q, v, a, order, tol):
+def column_step(motion):
     """The longest step that the series of the tangent's columns allow, each relative to its own size."""
-    step, own = np.inf, where[Where.OWN]
-    for first in range(own, where[Where.DOF], own):
+    q, v, a = motion.coordinate_series, motion.velocity_series, motion.acceleration_series
+    step, own, order, tol = np.inf, motion.own, motion.order, ROUGHER * motion.tolerance
+    for first in range(own, motion.dof, own):
         size = 0.0
         for i in range(first, first + own):
             size = max(size, abs(q[i, 0]), abs(v[i, 0]), abs(a[i, 0]))
@@ -161,33 +176,35 @@ def column_step(where, q, v, a, order, tol):
 
 
 @lean_jit
-def record_step(where, steps, side, t, h, q):
+def record_step(motion, side, t, h):
     """Append a step of the dense output: its start, its length, and the coordinates' series."""
-    if where[Where.DENSE] == 0:
+    if motion.dense == 0:
         return
-    labels, spans, coefficients = steps
-    i = where[Where.STEPS]
-    labels[i, 0], labels[i, 1] = where[Where.PERIOD], side
+    labels, spans, coefficients = motion.step_labels, motion.step_spans, motion.step_series
+    i = motion.recorded_steps
+    labels[i, 0], labels[i, 1] = motion.period, side
     spans[i, 0], spans[i, 1] = t, h
-    for d in range(where[Where.OWN]):
-        for k in range(where[Where.ORDER] + 2):
-            coefficients[i, d, k] = q[d, k]
-    where[Where.STEPS] = i + 1
+    for d in range(motion.own):
+        for k in range(motion.order + 2):
+            coefficients[i, d, k] = motion.coordinate_series[d, k]
+    motion.recorded_steps = i + 1
 
 
 @lean_jit
-def next_target(where, state, breaks, origin, t_end):
+def next_target(motion, t_end):
     """The time up to which the next step may go: the end of the forcing period, or a breakpoint of the records before."""
-    while where[Where.PIECE] < breaks.size and breaks[where[Where.PIECE]] - origin <= state[State.TIME]:
-        where[Where.PIECE] += 1
-    if where[Where.PIECE] < breaks.size:
-        return min(t_end, breaks[where[Where.PIECE]] - origin)
+    breaks, before = motion.breaks, motion.piece
+    while motion.piece < breaks.size and breaks[motion.piece] - motion.origin <= motion.time:
+        motion.piece += 1
+    motion.new_piece = 1 if motion.piece != before else 0
+    if motion.piece < breaks.size:
+        return min(t_end, breaks[motion.piece] - motion.origin)
     return t_end
 
 
 @lean_jit
-def motion_end(where, settings):
+def motion_end(motion):
     """The time at which the motion ends, as counted from the present forcing period."""
-    if where[Where.UNTIL_SMOOTH] > 0:
-        return settings[Setting.HORIZON]
-    return (where[Where.LAST_PERIOD] - where[Where.PERIOD]) * settings[Setting.LENGTH] + settings[Setting.END]
+    if motion.until_smooth > 0:
+        return motion.horizon
+    return (motion.last_period - motion.period) * motion.period_length + motion.end

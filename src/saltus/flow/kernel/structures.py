@@ -22,7 +22,7 @@ class Program:
     trace: Trace
     structure: Structure
     env: tuple[Any, ...]  # parameters, constants, record breakpoints, record table
-    model: tuple[Any, ...]  # the structure's functions and the geometry of its contact
+    model: Any  # the structure's functions and the geometry of its contact
     limits: tuple[str, ...]
 
     def with_numbers(self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray]) -> Program:

@@ -15,7 +15,7 @@ from saltus.flow.contacts import lane_step as several_contacts
 from saltus.flow.contacts import layout as contact_layout
 from saltus.flow.kernel import function_types as scalar_types
 from saltus.flow.kernel import layout as kernel_layout
-from saltus.flow.kernel import memory_layout, roots
+from saltus.flow.kernel import memory, memory_layout, roots, steps
 from saltus.flow.kernel.compiled import contacts_module, kernel_module
 from saltus.flow.lanes import (
     contact_function_types,
@@ -55,12 +55,13 @@ from saltus.taylor import (
     vectors,
 )
 
-_TYPES = (scalar_types, function_types, contact_function_types, vectors, lane_vectors)
+_TYPES = (memory, scalar_types, function_types, contact_function_types, vectors, lane_vectors)
 _WRITTEN_BY = digest(*(source_of(module) for module in _TYPES))
 _SIGNATURES = f"""import math
 
 import numpy as np
 
+from saltus.flow.kernel.memory import *
 from saltus.flow.lanes.function_types import *
 from saltus.taylor.lane_vectors import *
 from saltus.taylor.numba_types import by_reference
@@ -118,7 +119,7 @@ def load_helpers(several: bool = False) -> tuple[Any, ...]:
     """The functions that the driver calls for one lane: `lane_root`, `turning_range`, `scalar_motion`; with several contacts also
     `contacts_impact`."""
     names = ["lane_root", "turning_range", "scalar_motion"]
-    parts = [kernel_layout, lane_layout, load_tables, roots, scalar_fallback, lane_state]
+    parts = [kernel_layout, lane_layout, load_tables, roots, steps, scalar_fallback, lane_state]
     if several:
         names.append("contacts_impact")
         parts += [contact_layout, complementarity, contact_impacts, contacts_of_lane, contacts_handoff]
@@ -143,7 +144,7 @@ def load_lane_functions(trace: Trace) -> tuple[Slots, tuple[Any, ...]]:
 @cache
 def load_advance(several: bool = False) -> Any:
     """The scalar kernel, which the driver calls for one lane."""
-    return pointer(contacts_module().advance_contacts if several else kernel_module().advance)
+    return pointer((contacts_module() if several else kernel_module()).advance)
 
 
 def compile_everything(several: bool = False) -> None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from numba import types
 
-from saltus.flow.kernel.function_types import ADVANCE_CONTACTS, CONSTANTS, CONTACT_MODEL, MATRICES
+from saltus.flow.kernel.function_types import ADVANCE_CONTACTS, CONSTANTS, CONTACT_MODEL, MATRICES, NUMBERS
+from saltus.flow.kernel.memory import SolverArrays
 from saltus.flow.lanes.function_types import (
     JOBS,
     LANE_FIELD,
@@ -24,8 +25,8 @@ _f1, _f2, _f3 = (types.Array(_f, n, "C") for n in (1, 2, 3))
 _i1, _i2, _i3 = (types.Array(_i, n, "C") for n in (1, 2, 3))
 
 LANES = types.Tuple((_i2, _f2, _f2, _f2, _f3, _i2, _i3))
-_SOLVER = types.Tuple((_f1, *4 * (_f2,), *12 * (_f1,), _f2))
-SPACE = types.Tuple((_f1, _f1, _i1, _f1, _i2, _SOLVER))
+_SOLVER = types.NamedTuple((_f1, *4 * (_f2,), *12 * (_f1,), _f2), SolverArrays)
+SPACE = types.Tuple((_f1, _f1, NUMBERS, _f1, _i2, _SOLVER))
 _functions = (LANE_SERIES, LANE_IMPACT, LANE_FIELD, CONSTANTS, MATRICES, LANE_ONE_FREE)
 CODE = types.Tuple([written_type(s) for s in _functions])
 SCALAR = types.Tuple((function_type(ADVANCE_CONTACTS), CONTACT_MODEL))

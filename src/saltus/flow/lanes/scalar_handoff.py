@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.flow.kernel.layout import Geometry, Mode, Status, Where
-from saltus.flow.kernel.memory_layout import EventCode, State
+from saltus.flow.kernel.layout import Geometry, Mode, Status
+from saltus.flow.kernel.memory import EventBuffers, OneContactFunctions, StepBuffers
+from saltus.flow.kernel.memory_layout import EventCode
 from saltus.flow.lanes.function_types import SCALAR_MOTION
 from saltus.flow.lanes.lane_layout import LaneArray, LaneLabel, Slot
 from saltus.flow.lanes.lane_state import BUFFER_LENGTH, put_state, record_extrema, scalar_state
@@ -18,30 +19,30 @@ from saltus.taylor import cached_jit, get, lean_jit, own_records, put
 
 
 @lean_jit
-def record_events(lane, where, m, lanes, events):
+def record_events(lane, motion, m, lanes, events):
     """Record the impacts of the scalar kernel's last call; returns the last event's detail."""
     detail = 0
-    for i in range(where[Where.EVENTS]):
-        kind, detail = events[0][i, 1], events[0][i, 3]
+    for i in range(motion.recorded_events):
+        kind, detail = events.event_labels[i, 1], events.event_labels[i, 3]
         if kind == EventCode.IMPACT:
             put(m, Slot.IMPACTS, lane, get(m, Slot.IMPACTS, lane) + 1.0)
-            put(m, Slot.LEAST_SPEED, lane, min(get(m, Slot.LEAST_SPEED, lane), abs(events[1][i, 1])))
+            put(m, Slot.LEAST_SPEED, lane, min(get(m, Slot.LEAST_SPEED, lane), abs(events.event_values[i, 1])))
         elif kind == EventCode.GRAZING:
             lanes[LaneArray.LABELS][lane, LaneLabel.GRAZINGS] += 1
     return detail
 
 
 @lean_jit
-def is_captured(where, state, geometry, threshold):
+def is_captured(motion, state, geometry, threshold):
     """Whether a motion is proved to be captured: at rest, or at the contact with a speed of the gap below the threshold."""
-    if where[Where.MODE] == Mode.REST:
+    if motion.mode == Mode.REST:
         return threshold > 0.0
-    if where[Where.MODE] == Mode.CHATTER:
-        return state[State.CHATTER_SPEED] < threshold
-    if where[Where.MODE] != Mode.ARC or where[Where.SKIP] != 1:
+    if motion.mode == Mode.CHATTER:
+        return motion.chatter_speed < threshold
+    if motion.mode != Mode.ARC or motion.skip != 1:
         return False
-    rate = geometry[Geometry.RATE_UP] if where[Where.SIDE] > 0 else geometry[Geometry.RATE_DOWN]
-    return rate * state[State.COORDINATES + where[Where.DOF]] < threshold
+    rate = geometry[Geometry.RATE_UP] if motion.side > 0 else geometry[Geometry.RATE_DOWN]
+    return rate * state[motion.dof] < threshold
 
 
 @cached_jit(SCALAR_MOTION)
@@ -52,25 +53,26 @@ def scalar_motion(lane, scalar, sizes, at, m, flags, settings, lanes, parameters
     """
     advance, functions = scalar
     geometry = lanes[LaneArray.GEOMETRY][lane]
-    where, state, limits = scalar_state(lane, sizes, at, m, flags, settings, lanes)
+    array, state = scalar_state(lane, sizes, at, m, flags, settings, lanes)
+    motion, rows = array[0], np.empty((0, 1), np.int64)
     trajectory = lanes[LaneArray.LABELS][lane, LaneLabel.TRAJECTORY]
     breaks, table = own_records(tables, trajectory)
     env = (parameters[trajectory], lanes[LaneArray.CONSTANTS][lane], breaks, table)
-    model = (functions[0], functions[1], functions[2], functions[3], geometry, functions[4])  # in the places of `ModelPart`
-    steps = (
+    model = OneContactFunctions(functions[0], functions[1], functions[2], functions[3], geometry, functions[4])
+    steps = StepBuffers(
         np.empty((BUFFER_LENGTH, 2), np.int64),
         np.empty((BUFFER_LENGTH, 2)),
-        np.empty((BUFFER_LENGTH, where[Where.OWN], where[Where.ORDER] + 2)),
+        np.empty((BUFFER_LENGTH, motion.own, motion.order + 2)),
     )
-    events = (np.empty((BUFFER_LENGTH, 4), np.int64), np.empty((BUFFER_LENGTH, 3 + where[Where.COLUMNS])))
+    events = EventBuffers(np.empty((BUFFER_LENGTH, 4), np.int64), np.empty((BUFFER_LENGTH, 3 + motion.columns)))
     while True:
-        status = advance(where, state, limits, env, model, steps, events)
-        detail = record_events(lane, where, m, lanes, events)
-        record_extrema(lane, where, m, steps, poly)
+        status = advance(array, state, env, model, rows, (steps, events))
+        detail = record_events(lane, motion, m, lanes, events)
+        record_extrema(lane, motion, m, steps, poly)
         if (status != Status.FULL and status != Status.PAUSED) or control[0] != 0:
             break
-    put_state(lane, at, m, flags, lanes, where, state)
+    put_state(lane, at, m, flags, lanes, motion, state)
     if status in (Status.DONE, Status.SMOOTH, Status.FULL, Status.PAUSED):
-        captured = is_captured(where, state, geometry, get(m, Slot.CAPTURE_SPEED, lane))
+        captured = is_captured(motion, state, geometry, get(m, Slot.CAPTURE_SPEED, lane))
         return Status.CAPTURED if captured else Status.PAUSED, 0
     return status, detail

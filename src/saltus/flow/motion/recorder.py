@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from saltus.errors import MotionError
 from saltus.flow.contacts.events import ContactEvents
-from saltus.flow.kernel.layout import Where
+from saltus.flow.kernel.memory import EventBuffers, StepBuffers
 from saltus.flow.kernel.memory_layout import EventCode
 from saltus.flow.motion.dense_output import DenseOutput
 from saltus.flow.motion.motion import MotionEvents, Samples
@@ -40,13 +41,13 @@ class Recorder:
     def __init__(self, request: MotionRequest, order: int, columns: int) -> None:
         kept = request.dense or request.sample_times is not None
         dof, size = len(request.system.model.coordinates), MOST.buffer if kept else 8
-        self.steps = (np.empty((size, 2), dtype=np.int64), np.empty((size, 2)), np.empty((size, dof, order + 2)))
+        self.steps = StepBuffers(np.empty((size, 2), dtype=np.int64), np.empty((size, 2)), np.empty((size, dof, order + 2)))
         model = request.system.model
         self._contacts = [contact.name for contact in model.contacts]
         self._frictions = [friction.name for friction in model.frictions]
         self._several = model.holds_coordinates
         self._width = 1 + 2 * dof + len(self._contacts) if self._several else 3  # the numbers of an event before its shifts
-        self.events = (np.empty((MOST.buffer, 4), dtype=np.int64), np.empty((MOST.buffer, self._width + columns)))
+        self.events = EventBuffers(np.empty((MOST.buffer, 4), dtype=np.int64), np.empty((MOST.buffer, self._width + columns)))
         self.total = 0  # events so far
         self._kept = 0  # steps so far
         self._length, self._times = float(request.clock.length), request.sample_times
@@ -56,14 +57,14 @@ class Recorder:
         self._next = 0  # index of the first sample time that is still to come
         self._check = ValidityCheck(request.system)
 
-    def take(self, where: np.ndarray) -> None:
+    def take(self, numbers: Any) -> None:
         """Empty the buffers."""
-        labels, spans, series = (a[: where[Where.STEPS]].copy() for a in self.steps)
+        labels, spans, series = (a[: numbers["recorded_steps"]].copy() for a in self.steps)
         if labels.size:
             self._add(DenseOutput(labels[:, 0] * self._length + spans[:, 0], spans[:, 1], labels[:, 1], series))
-        self._events.append(tuple(a[: where[Where.EVENTS]].copy() for a in self.events))
-        self.total += int(where[Where.EVENTS])
-        where[Where.STEPS] = where[Where.EVENTS] = 0
+        self._events.append(tuple(a[: numbers["recorded_events"]].copy() for a in self.events))
+        self.total += int(numbers["recorded_events"])
+        numbers["recorded_steps"] = numbers["recorded_events"] = 0
 
     def _add(self, piece: DenseOutput) -> None:
         if self._times is None:

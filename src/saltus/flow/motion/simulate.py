@@ -9,8 +9,7 @@ import numpy as np
 
 from saltus.errors import MotionError
 from saltus.flow.contacts.state import ContactState
-from saltus.flow.kernel.layout import Mode, Setting, Status, Where
-from saltus.flow.kernel.memory_layout import State
+from saltus.flow.kernel.layout import Mode, Status
 from saltus.flow.kernel.structures import Program, program
 from saltus.flow.motion.motion import Motion
 from saltus.flow.motion.recorder import MOST, Recorder
@@ -108,7 +107,7 @@ def follow(request: MotionRequest, progress: Progress, run: Program | None = Non
     """Follow the motion of a request, with its tangent if the request asks for one; `run` is its program, if that is known."""
     run = run or program(request.system, request.limits, request.sensitivities)
     now = (ContactState if request.system.model.holds_coordinates else KernelState).at_start(request, run)
-    recorder = Recorder(request, int(now.where[Where.ORDER]), int(now.where[Where.COLUMNS]))
+    recorder = Recorder(request, int(now.numbers["order"]), int(now.numbers["columns"]))
     status = _advance(request.system, run, now, recorder, progress)
     return Followed(_collect(request, now, status, recorder), now.columns, recorder.event_shifts())
 
@@ -117,11 +116,11 @@ def _advance(system: System, run: Program, now: KernelState, recorder: Recorder,
     """Call the kernel until the motion ends, emptying its buffers in between; returns why it ended."""
     begin, end = now.time, now.end_time
     many = MOST.burst if system.model.holds_coordinates else MOST.rate
-    checked_at, counted, unit = begin, 0, min(now.settings[Setting.LENGTH] or 1.0, 1.0) * many / MOST.rate
+    checked_at, counted, unit = begin, 0, min(now.numbers["period_length"] or 1.0, 1.0) * many / MOST.rate
     progress(0.0, WHAT)
     while True:
         status = now.advance(run, recorder.steps, recorder.events)
-        recorder.take(now.where)
+        recorder.take(now.numbers)
         time = now.time
         if end > begin:
             progress((time - begin) / (end - begin), WHAT)
@@ -192,7 +191,7 @@ def _refuse(system: System, status: int, now: KernelState) -> None:
 def _collect(request: MotionRequest, now: KernelState, status: int, recorder: Recorder) -> Motion:
     """The motion from the kernel's last state and its records."""
     events, time, position, velocity = recorder.all_events(), now.time, now.position, now.velocity
-    mode, one, start = now.where[Where.MODE], now.position.size == 1, float(request.time)
+    mode, one, start = now.numbers["mode"], now.position.size == 1, float(request.time)
     stop, limit = (Stop.REST if mode == Mode.REST else Stop.HORIZON), None
     if status == Status.LIMITED:
         stop, limit = Stop.LIMIT, request.limits[events.details[-1]]
@@ -209,8 +208,8 @@ def _collect(request: MotionRequest, now: KernelState, status: int, recorder: Re
         side=now.side,
         stop=stop,
         limit=limit,
-        chatter_speed=float(now.state[State.CHATTER_SPEED]) if mode == Mode.CHATTER else None,
-        periods=int(now.where[Where.PERIOD]),
+        chatter_speed=float(now.numbers["chatter_speed"]) if mode == Mode.CHATTER else None,
+        periods=int(now.numbers["period"]),
         events=events,
         impacts=events.impacts(),
         dense=recorder.dense(),

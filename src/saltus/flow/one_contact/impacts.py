@@ -7,90 +7,77 @@ from __future__ import annotations
 
 import math
 
-from saltus.flow.kernel.layout import (
-    CHATTER_SPEED,
-    LOSSLESS,
-    SLOW,
-    SLOWLY,
-    TINY,
-    Geometry,
-    GrazingDetail,
-    Mode,
-    ModelPart,
-    Setting,
-    Status,
-    Where,
-    Work,
-)
-from saltus.flow.kernel.memory_layout import EventCode, ReleaseDetail, RestDetail, State
+from saltus.flow.kernel.layout import CHATTER_SPEED, LOSSLESS, SLOW, SLOWLY, TINY, Geometry, GrazingDetail, Mode, Status
+from saltus.flow.kernel.memory_layout import EventCode, ReleaseDetail, RestDetail
 from saltus.flow.kernel.roots import leading
-from saltus.flow.kernel.steps import forget, motion_end, record_event, record_shift, record_step
+from saltus.flow.kernel.steps import columns_at_event, forget, motion_end, record_event, record_shift, record_step
 from saltus.taylor import lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
 
 @lean_jit
-def rate_of(model, side):
+def rate_of(motion, side):
     """The gap's rate of change with the coordinate at contact, on a side."""
-    return model[ModelPart.GEOMETRY][Geometry.RATE_UP] if side > 0.0 else model[ModelPart.GEOMETRY][Geometry.RATE_DOWN]
+    return motion.geometry[Geometry.RATE_UP] if side > 0.0 else motion.geometry[Geometry.RATE_DOWN]
 
 
 @lean_jit
-def set_state(where, state, position, velocity):
+def set_state(motion, position, velocity):
     """Put the first coordinate and its velocity into the state."""
-    state[State.COORDINATES], state[State.COORDINATES + where[Where.DOF]] = position, velocity
+    motion.coordinates[0], motion.velocities[0] = position, velocity
 
 
 @lean_jit
-def hold(where, state, model, q):
+def hold(motion):
     """Put the system at rest at contact."""
-    set_state(where, state, model[ModelPart.GEOMETRY][Geometry.CONTACT], 0.0)
+    q = motion.coordinate_series
+    set_state(motion, motion.geometry[Geometry.CONTACT], 0.0)
     for k in range(q.shape[1]):
         q[0, k] = 0.0
-    q[0, 0] = state[State.COORDINATES]
+    q[0, 0] = motion.coordinates[0]
 
 
 @lean_jit
-def contact_accelerations(where, env, model, work, t, origin):
+def contact_accelerations(motion, t):
     """Fill `b` with the Taylor series in time of the gap's second derivative at rest at contact, on side +1 and on side -1."""
-    b, w = work[Work.CONTACT], work[Work.RECURRENCES]
-    for i in range(min(where[Where.SIDES], 2)):
-        model[ModelPart.CONTACT_SERIES](t, origin, 1.0 - 2.0 * i, env, where[Where.PIECE], b[i], w, where[Where.ORDER])
+    b, w = motion.pull_series, motion.recurrences
+    for i in range(min(motion.sides, 2)):
+        motion.contact_series(t, motion.origin, 1.0 - 2.0 * i, motion.env, motion.piece, b[i], w, motion.order)
 
 
 @lean_jit
-def leave_or_stay(where, state, env, model, work, origin):
+def leave_or_stay(motion):
     """Decide whether a system at rest at the contact leaves it on an ARC or stays in REST. False if that is not unique.
 
     On each side the sign of the first non-zero Taylor coefficient of the contact acceleration decides; `SKIP` holds the side, if
     any, on which the acceleration has just been found to be zero. If both sides point outward the motion is not unique, unless
     the caller has given the side (`LEAVE_BY`).
     """
-    b, order, released, outward = work[Work.CONTACT], where[Where.ORDER], where[Where.SKIP], 0
-    contact_accelerations(where, env, model, work, state[State.TIME], origin)
-    for i in range(where[Where.SIDES]):
+    b, order, released, outward = motion.pull_series, motion.order, motion.skip, 0
+    contact_accelerations(motion, motion.time)
+    for i in range(motion.sides):
         side = 1 - 2 * i
         skip = leading(b[i], 1 if released == side else 0, order)
-        if skip < order and b[i, skip] > 0.0 and (outward == 0 or where[Where.LEAVE_BY] != where[Where.SIDE]):
+        if skip < order and b[i, skip] > 0.0 and (outward == 0 or motion.leave_by != motion.side):
             outward += 1
-            where[Where.SIDE], where[Where.SKIP] = side, skip + 2
-    if outward == 2 and where[Where.LEAVE_BY] != where[Where.SIDE]:
+            motion.side, motion.skip = side, skip + 2
+    if outward == 2 and motion.leave_by != motion.side:
         return False
-    where[Where.MODE] = Mode.ARC if outward > 0 else Mode.REST
+    motion.mode = Mode.ARC if outward > 0 else Mode.REST
     return True
 
 
 @lean_jit
-def contact_pull(side, env, model, piece, work, t, origin):
+def contact_pull(motion, side, t):
     """The second derivative of the gap at rest at contact on one side, and its rate of change."""
-    b, w = work[Work.CONTACT], work[Work.RECURRENCES]
-    model[ModelPart.CONTACT_SERIES](t, origin, side, env, piece, b[0], w, 1)
+    b, w = motion.pull_series, motion.recurrences
+    motion.contact_series(t, motion.origin, side, motion.env, motion.piece, b[0], w, 1)
     return b[0, 0], b[0, 1]
 
 
 @lean_jit
-def accumulation(where, env, model, work, speed, t, origin, tol):
+def accumulation(motion, speed, t, tol):
     """The mode that follows a small impact, and, for an accumulation, the time left until its end.
 
     REST: impacts accumulate soon. From the gap's speed v on side s the time left is
@@ -99,19 +86,19 @@ def accumulation(where, env, model, work, speed, t, origin, tol):
     change of the accelerations. CHATTER: impacts lose nothing, are slower than CHATTER_SPEED, and the accelerations change slowly
     over two of them. ARC: neither of these.
     """
-    side, piece = float(where[Where.SIDE]), where[Where.PIECE]
-    here, slope_here = contact_pull(side, env, model, piece, work, t, origin)
+    side, piece = float(motion.side), motion.piece
+    here, slope_here = contact_pull(motion, side, t)
     if here >= 0.0:
         return Mode.ARC, 0.0
-    next_side, after = model[ModelPart.RESET](t, origin, -speed / rate_of(model, side), side, env, piece)
-    there, slope_there = contact_pull(next_side, env, model, piece, work, t, origin)
+    next_side, after = motion.reset(t, motion.origin, -speed / rate_of(motion, side), side, motion.env, piece)
+    there, slope_there = contact_pull(motion, next_side, t)
     if there >= 0.0 or after != after:
         return Mode.ARC, 0.0
-    next_speed = rate_of(model, next_side) * after
+    next_speed = rate_of(motion, next_side) * after
     first, second = next_speed / speed, 0.0
     if first > 0.0:
-        third_side, last = model[ModelPart.RESET](t, origin, -after, next_side, env, piece)
-        second = rate_of(model, third_side) * last / next_speed
+        third_side, last = motion.reset(t, motion.origin, -after, next_side, motion.env, piece)
+        second = rate_of(motion, third_side) * last / next_speed
     loss = 1.0 - first * second
     cycle = 2.0 * speed * (1.0 / abs(here) + first / abs(there))
     change = 1.0 + abs(slope_here / here) + abs(slope_there / there)
@@ -130,108 +117,107 @@ def slow_speed(tol):
 
 
 @lean_jit
-def rest_columns(where, state, env, model, work, events, t, origin, tol):
+def rest_columns(motion, t, tol):
     """The tangent at rest that begins at once; after an impact that leaves no speed, its instant moves as that of the impact.
 
     A motion that begins next to rest comes to rest soon, unless impacts lose nothing: then there is no derivative to the state.
     """
-    mode, _ = accumulation(where, env, model, work, TINY, t, origin, tol)
+    mode, _ = accumulation(motion, TINY, t, tol)
     detail = RestDetail.AT_ONCE if mode == Mode.REST else RestDetail.NEVER_AGAIN
-    model[ModelPart.TANGENT](EventCode.RESTING, detail, t, origin, float(where[Where.SIDE]), env, where[Where.PIECE], state)
-    events[0][where[Where.EVENTS] - 1, 3] = detail
-    record_shift(where, state, events)
+    columns_at_event(motion, EventCode.RESTING, detail, t, float(motion.side))
+    motion.event_labels[motion.recorded_events - 1, 3] = detail
+    record_shift(motion)
 
 
 @lean_jit
-def release_columns(where, state, env, model, events, t, origin):
+def release_columns(motion, t):
     """The tangent at a release. Its instant moves with the simple root of the contact acceleration; if a jump of the load
     releases the system, the instant is fixed."""
-    breaks, piece = env[2], where[Where.PIECE]
-    detail = ReleaseDetail.AT_A_ROOT if where[Where.SKIP] <= 3 else ReleaseDetail.AT_NONE
-    if where[Where.SKIP] == 2 and piece > 0 and abs(breaks[piece - 1] - origin - t) < 1e-12 * max(1.0, abs(origin)):
+    breaks, piece = motion.breaks, motion.piece
+    detail = ReleaseDetail.AT_A_ROOT if motion.skip <= 3 else ReleaseDetail.AT_NONE
+    if motion.skip == 2 and piece > 0 and abs(breaks[piece - 1] - motion.origin - t) < 1e-12 * max(1.0, abs(motion.origin)):
         detail = ReleaseDetail.AT_A_JUMP
-    model[ModelPart.TANGENT](EventCode.RELEASE, detail, t, origin, float(where[Where.SIDE]), env, piece, state)
-    for j in range(where[Where.COLUMNS]):
-        if math.isnan(state[State.COORDINATES + where[Where.OWN] + j]):
-            state[State.COORDINATES + 2 * where[Where.DOF] + j] = math.nan
-    record_shift(where, state, events)
+    columns_at_event(motion, EventCode.RELEASE, detail, t, float(motion.side))
+    for j in range(motion.columns):
+        if math.isnan(motion.coordinates[motion.own + j]):
+            motion.shifts[j] = math.nan
+    record_shift(motion)
 
 
 @lean_jit
-def decide_at_rest(where, state, settings, env, model, work, events, origin):
+def decide_at_rest(motion):
     """Decide whether a system at rest at the contact stays or leaves. Returns PAUSED to go on, or NOT_UNIQUE."""
-    t = state[State.TIME]
-    if not leave_or_stay(where, state, env, model, work, origin):
+    t = motion.time
+    if not leave_or_stay(motion):
         return Status.NOT_UNIQUE
-    if where[Where.MODE] == Mode.REST and where[Where.HELD] == 0:
-        record_event(where, events, EventCode.RESTING, 0, 0, t, 0.0, 0.0)
-        if where[Where.COLUMNS] > 0:
-            rest_columns(where, state, env, model, work, events, t, origin, settings[Setting.TOLERANCE])
-    if where[Where.MODE] == Mode.ARC and where[Where.HELD] != 0:
-        record_event(where, events, EventCode.RELEASE, where[Where.SIDE], where[Where.SKIP], t, 0.0, 0.0)
-        if where[Where.COLUMNS] > 0:
-            release_columns(where, state, env, model, events, t, origin)
-    where[Where.HELD] = 1 if where[Where.MODE] == Mode.REST else 0
-    hold(where, state, model, work[Work.POSITIONS])
+    if motion.mode == Mode.REST and motion.rested == 0:
+        record_event(motion, EventCode.RESTING, 0, t, 0.0, 0.0)
+        if motion.columns > 0:
+            rest_columns(motion, t, motion.tolerance)
+    if motion.mode == Mode.ARC and motion.rested != 0:
+        record_event(motion, EventCode.RELEASE, motion.skip, t, 0.0, 0.0)
+        if motion.columns > 0:
+            release_columns(motion, t)
+    motion.rested = 1 if motion.mode == Mode.REST else 0
+    hold(motion)
     return Status.PAUSED
 
 
 @lean_jit
-def end_accumulation(where, state, env, model, work, steps, events, origin, left, t_end):
+def end_accumulation(motion, left, t_end):
     """Come to rest after the time `left`, within which all further impacts of the accumulation take place."""
-    q, t = work[Work.POSITIONS], state[State.TIME]
-    record_event(where, events, EventCode.RESTING, 0, 0, t + left, 0.0, 0.0)
-    if where[Where.COLUMNS] > 0:
-        side, piece = float(where[Where.SIDE]), where[Where.PIECE]
-        model[ModelPart.TANGENT](EventCode.RESTING, RestDetail.AFTER_IMPACTS, t, origin, side, env, piece, state)
-        record_shift(where, state, events)
-    hold(where, state, model, q)
-    state[State.TIME] = min(t + left, t_end)
-    record_step(where, steps, 0, t, state[State.TIME] - t, q)
+    t = motion.time
+    record_event(motion, EventCode.RESTING, 0, t + left, 0.0, 0.0)
+    if motion.columns > 0:
+        columns_at_event(motion, EventCode.RESTING, RestDetail.AFTER_IMPACTS, t, float(motion.side))
+        record_shift(motion)
+    hold(motion)
+    motion.time = min(t + left, t_end)
+    record_step(motion, 0, t, motion.time - t)
 
 
 @lean_jit
-def decide(where, state, settings, env, model, work, steps, events, origin, t_end):
+def decide(motion, t_end):
     """Find the next mode of a system at the contact. Returns PAUSED to go on, or why the motion ends."""
-    t, velocity, tol = state[State.TIME], state[State.COORDINATES + where[Where.DOF]], settings[Setting.TOLERANCE]
+    t, velocity, tol = motion.time, motion.velocities[0], motion.tolerance
     if velocity == 0.0:
-        return decide_at_rest(where, state, settings, env, model, work, events, origin)
-    where[Where.MODE], where[Where.SKIP], where[Where.HELD] = Mode.ARC, 1, 0
-    speed = rate_of(model, float(where[Where.SIDE])) * velocity
+        return decide_at_rest(motion)
+    motion.mode, motion.skip, motion.rested = Mode.ARC, 1, 0
+    speed = rate_of(motion, float(motion.side)) * velocity
     if speed < slow_speed(tol):
-        mode, left = accumulation(where, env, model, work, speed, t, origin, tol)
-        if mode == Mode.REST and t + left > motion_end(where, settings):
+        mode, left = accumulation(motion, speed, t, tol)
+        if mode == Mode.REST and t + left > motion_end(motion):
             mode = Mode.ARC  # the motion ends before the accumulation does
         if mode == Mode.REST:
-            end_accumulation(where, state, env, model, work, steps, events, origin, left, t_end)
+            end_accumulation(motion, left, t_end)
         if mode == Mode.CHATTER:
-            record_event(where, events, EventCode.CHATTERING, where[Where.SIDE], 0, t, velocity, velocity)
-            forget(where, state)
-            hold(where, state, model, work[Work.POSITIONS])
-            state[State.CHATTER_SPEED], where[Where.SKIP] = speed, 0
-        where[Where.MODE], where[Where.HELD] = mode, 0 if mode == Mode.ARC else 1
+            record_event(motion, EventCode.CHATTERING, 0, t, velocity, velocity)
+            forget(motion)
+            hold(motion)
+            motion.chatter_speed, motion.skip = speed, 0
+        motion.mode, motion.rested = mode, 0 if mode == Mode.ARC else 1
     return Status.PAUSED
 
 
 @lean_jit
-def impact(where, state, env, model, events, t, origin, before):
+def impact(motion, t, before):
     """Apply the reset at time `t` to the velocity `before`. Returns PAUSED, or NO_IMPACT with the velocity left in the state."""
-    side, piece, contact = float(where[Where.SIDE]), where[Where.PIECE], model[ModelPart.GEOMETRY][Geometry.CONTACT]
-    state[State.TIME] = t
-    set_state(where, state, contact, before)
-    where[Where.MODE], where[Where.SKIP], where[Where.HELD] = Mode.CONTACT, 0, 0
-    if rate_of(model, side) * before >= 0.0:  # a triple root of the gap within rounding: there is no closing speed
-        set_state(where, state, contact, 0.0)
-        record_event(where, events, EventCode.GRAZING, where[Where.SIDE], GrazingDetail.TRIPLE, t, before, 0.0)
-        forget(where, state)
+    side, piece, contact = float(motion.side), motion.piece, motion.geometry[Geometry.CONTACT]
+    motion.time = t
+    set_state(motion, contact, before)
+    motion.mode, motion.skip, motion.rested = Mode.CONTACT, 0, 0
+    if rate_of(motion, side) * before >= 0.0:  # a triple root of the gap within rounding: there is no closing speed
+        set_state(motion, contact, 0.0)
+        record_event(motion, EventCode.GRAZING, GrazingDetail.TRIPLE, t, before, 0.0)
+        forget(motion)
         return Status.PAUSED
-    next_side, after = model[ModelPart.RESET](t, origin, before, side, env, piece)
-    if not rate_of(model, next_side) * after >= 0.0:
+    next_side, after = motion.reset(t, motion.origin, before, side, motion.env, piece)
+    if not rate_of(motion, next_side) * after >= 0.0:
         return Status.NO_IMPACT
-    record_event(where, events, EventCode.IMPACT, where[Where.SIDE], int(next_side), t, before, after)
-    if where[Where.COLUMNS] > 0:
-        model[ModelPart.TANGENT](EventCode.IMPACT, 0, t, origin, side, env, piece, state)
-        record_shift(where, state, events)
-    where[Where.SIDE] = int(next_side)
-    set_state(where, state, contact, after)
+    record_event(motion, EventCode.IMPACT, int(next_side), t, before, after)
+    if motion.columns > 0:
+        columns_at_event(motion, EventCode.IMPACT, 0, t, side)
+        record_shift(motion)
+    motion.side = int(next_side)
+    set_state(motion, contact, after)
     return Status.PAUSED

@@ -18,112 +18,99 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.flow.kernel.function_types import ADVANCE
-from saltus.flow.kernel.layout import (
-    BATCH,
-    CHATTER_SPEED,
-    EXACT,
-    ROUGHER,
-    SHORTEST,
-    GrazingDetail,
-    Mode,
-    ModelPart,
-    Setting,
-    Status,
-    Where,
-    Work,
-)
-from saltus.flow.kernel.memory_layout import EventCode, State
+from saltus.flow.kernel.layout import CHATTER_SPEED, EXACT, SHORTEST, GrazingDetail, Mode, Status
+from saltus.flow.kernel.memory import OneContactParts
+from saltus.flow.kernel.memory_layout import EventCode
 from saltus.flow.kernel.roots import NEVER, SIMPLE, contact_root, first_root, horner, leading, margin_root, scale_gap
 from saltus.flow.kernel.steps import (
     column_step,
+    columns_at_event,
     expand,
     leaps,
     move,
-    next_target,
     record_event,
     record_shift,
     record_step,
+    step_arrays,
     step_size,
-    work_arrays,
 )
 from saltus.flow.one_contact.chatter import chatter_decay
 from saltus.flow.one_contact.impacts import contact_accelerations, decide, hold, impact, rate_of
-from saltus.taylor import by_reference, cached_jit, lean_jit
+from saltus.taylor import jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
 
 @lean_jit
-def arc_step(where, settings, env, model, work, t, origin, target, size):
+def arc_step(motion, t, target, size):
     """The step that the series of an arc allow, beyond `target` or not."""
-    order, tol = where[Where.ORDER], settings[Setting.TOLERANCE]
-    q, v, a = work[Work.POSITIONS], work[Work.VELOCITIES], work[Work.ACCELERATIONS]
-    natural = step_size(v[: where[Where.OWN]], order, size, tol)
-    if where[Where.COLUMNS] > 0:
-        natural = min(natural, column_step(where, q, v, a, order, ROUGHER * tol))
-    while where[Where.CHECKED] > 0 and leaps(
-        where, env, model, work, t, origin, float(where[Where.SIDE]), min(natural, target - t), size, tol
-    ):
+    natural = step_size(motion.velocity_series[: motion.own], motion.order, size, motion.tolerance)
+    if motion.columns > 0:
+        natural = min(natural, column_step(motion))
+    while motion.checked > 0 and leaps(motion, t, float(motion.side), min(natural, target - t), size):
         natural = 0.5 * min(natural, target - t)
     return natural
 
 
 @lean_jit
-def first_margin(where, m, order, h, poly, hit, first):
+def first_margin(motion, h, hit, first):
     """The margin that reaches zero first within the step, and its instant, if this is before `first`; else `hit` and `first`."""
-    for j in range(where[Where.MARGINS]):
-        u = margin_root(m[j], order, h, poly)
+    for j in range(motion.margin_count):
+        u = margin_root(motion.margin_series[j], motion.order, h, motion.polynomial)
         if u < first:
             hit, first = j, u
     return hit, first
 
 
 @lean_jit
-def arc(where, state, settings, env, model, work, steps, events, origin, target):
+def arc(motion, target):
     """One step of a smooth motion, up to the first zero of the gap or of a margin. Returns PAUSED, or why the motion ends."""
-    q, v, _, g, m, _, poly, _, _ = work
-    order, t, side = where[Where.ORDER], state[State.TIME], where[Where.SIDE]
-    size = expand(where, state, env, model, work, t, origin, float(side), order)
-    natural = arc_step(where, settings, env, model, work, t, origin, target, size)
+    order, t, side, poly = motion.order, motion.time, motion.side, motion.polynomial
+    size = expand(motion, t, float(side), order)
+    natural = arc_step(motion, t, target, size)
     h = min(natural, target - t)
     hit, first, touch = -1, NEVER, NEVER
-    if where[Where.SIDES] > 0:
-        kind, u, touch = contact_root(g, where[Where.SKIP], order, h, poly)
+    if motion.sides > 0:
+        kind, u, touch = contact_root(motion.gap_series, motion.skip, order, h, poly)
         if kind == SIMPLE:
-            hit, first = where[Where.MARGINS], u
+            hit, first = motion.margin_count, u
         elif 0.75 < touch <= 1.0 and h == natural:  # a touch near the end of a step could be found again in the next one
             h, touch = 0.5 * h, NEVER
-    hit, first = first_margin(where, m, order, h, poly, hit, first)
+    hit, first = first_margin(motion, h, hit, first)
     if touch < first and touch <= 1.0:
         record_event(
-            where, events, EventCode.GRAZING, side, GrazingDetail.TOUCH, t + touch * h, horner(v[0], order, touch * h), 0.0
+            motion,
+            EventCode.GRAZING,
+            GrazingDetail.TOUCH,
+            t + touch * h,
+            horner(motion.velocity_series[0], order, touch * h),
+            0.0,
         )
     tau = first * h if hit >= 0 else h
-    record_step(where, steps, side, t, tau, q)
-    if not move(where, state, q, v, tau) or not h >= 0.0:
+    record_step(motion, side, t, tau)
+    if not move(motion, tau) or not h >= 0.0:
         return Status.NOT_FINITE
-    state[State.TIME] = target if hit < 0 and h == target - t else t + tau
-    where[Where.SKIP] = 0
-    velocity = state[State.COORDINATES + where[Where.DOF]]
-    if hit == where[Where.MARGINS]:
-        return impact(where, state, env, model, events, state[State.TIME], origin, velocity)
+    motion.time = target if hit < 0 and h == target - t else t + tau
+    motion.skip = 0
+    velocity = motion.velocities[0]
+    if hit == motion.margin_count:
+        return impact(motion, motion.time, velocity)
     if hit >= 0:
-        record_event(where, events, EventCode.LIMIT, side, hit, state[State.TIME], velocity, velocity)
-        if where[Where.COLUMNS] > 0:
-            model[ModelPart.TANGENT](EventCode.LIMIT, hit, state[State.TIME], origin, float(side), env, where[Where.PIECE], state)
-            record_shift(where, state, events)
+        record_event(motion, EventCode.LIMIT, hit, motion.time, velocity, velocity)
+        if motion.columns > 0:
+            columns_at_event(motion, EventCode.LIMIT, hit, motion.time, float(side))
+            record_shift(motion)
         return Status.LIMITED
-    unit = min(settings[Setting.LENGTH], 1.0) if settings[Setting.LENGTH] > 0.0 else 1.0
+    unit = min(motion.period_length, 1.0) if motion.period_length > 0.0 else 1.0
     return Status.PAUSED if natural > SHORTEST * unit or h == target - t else Status.STALLED
 
 
 @lean_jit
-def first_release(where, b, order, h, poly):
+def first_release(motion, b, order, h, poly):
     """The first instant at which a contact acceleration points outward, as a share of the step, and its side; 0 and 0 if one does
     already at the start."""
     first, released = NEVER, 0
-    for i in range(where[Where.SIDES]):
+    for i in range(motion.sides):
         skip = leading(b[i], 0, order)
         if skip < order and b[i, skip] > 0.0:
             first, released = 0.0, 0
@@ -138,66 +125,61 @@ def first_release(where, b, order, h, poly):
 
 
 @lean_jit
-def held(where, state, settings, env, model, work, steps, origin, target):
+def held(motion, target):
     """One step of REST or CHATTER, up to the first instant at which a contact acceleration points outward."""
-    q, b = work[Work.POSITIONS], work[Work.CONTACT]
-    order, t = where[Where.ORDER], state[State.TIME]
+    b, order, t = motion.pull_series, motion.order, motion.time
     h = target - t
-    contact_accelerations(where, env, model, work, t, origin)
-    for i in range(where[Where.SIDES]):
-        h = min(h, step_size(b[i : i + 1], order, max(1.0, abs(b[i, 0])), min(settings[Setting.TOLERANCE], EXACT)))
-    first, released = first_release(where, b, order, h, work[Work.POLYNOMIAL])
+    contact_accelerations(motion, t)
+    for i in range(motion.sides):
+        h = min(h, step_size(b[i : i + 1], order, max(1.0, abs(b[i, 0])), min(motion.tolerance, EXACT)))
+    first, released = first_release(motion, b, order, h, motion.polynomial)
     tau = min(first, 1.0) * h
-    if where[Where.MODE] == Mode.CHATTER and tau > 0.0:
-        chatter_decay(where, state, env, model, work, tau, origin)
-    hold(where, state, model, q)
-    record_step(where, steps, 0, t, tau, q)
+    if motion.mode == Mode.CHATTER and tau > 0.0:
+        chatter_decay(motion, tau)
+    hold(motion)
+    record_step(motion, 0, t, tau)
     if first > 1.0:
-        state[State.TIME] = target if h == target - t else t + tau
-        grown = state[State.CHATTER_SPEED] > 2.0 * CHATTER_SPEED
-        if where[Where.MODE] == Mode.CHATTER and grown:  # the impacts are followed one by one from here on
-            where[Where.MODE], where[Where.SKIP], where[Where.HELD] = Mode.CONTACT, 0, 0
-            velocity = state[State.CHATTER_SPEED] / rate_of(model, float(where[Where.SIDE]))
-            state[State.COORDINATES + where[Where.DOF]] = velocity
+        motion.time = target if h == target - t else t + tau
+        grown = motion.chatter_speed > 2.0 * CHATTER_SPEED
+        if motion.mode == Mode.CHATTER and grown:  # the impacts are followed one by one from here on
+            motion.mode, motion.skip, motion.rested = Mode.CONTACT, 0, 0
+            velocity = motion.chatter_speed / rate_of(motion, float(motion.side))
+            motion.velocities[0] = velocity
     else:
-        where[Where.MODE], where[Where.SKIP] = Mode.CONTACT, released
-        state[State.TIME] = t + tau if t + tau > t or released == 0 else np.nextafter(t, np.inf)  # time must increase
+        motion.mode, motion.skip = Mode.CONTACT, released
+        motion.time = t + tau if t + tau > t or released == 0 else np.nextafter(t, np.inf)  # time must increase
 
 
 @lean_jit
-def advance_with(where, state, settings, env_of, model_of, arrays, steps, events):
-    """`advance` with the arrays of `Work`."""
-    env, model, work = by_reference(env_of), by_reference(model_of), by_reference(arrays)
-    for batch in range(BATCH):
-        if where[Where.UNTIL_SMOOTH] > 0 and batch > 0 and where[Where.MODE] == Mode.ARC and where[Where.SKIP] <= 1:
-            return Status.SMOOTH
-        if where[Where.STEPS] >= steps[1].shape[0] - 4 or where[Where.EVENTS] >= events[1].shape[0] - 4:
-            return Status.FULL
-        origin = where[Where.PERIOD] * settings[Setting.LENGTH]
-        t_end = settings[Setting.END] if where[Where.PERIOD] == where[Where.LAST_PERIOD] else settings[Setting.LENGTH]
-        if state[State.TIME] >= t_end:
-            if where[Where.PERIOD] == where[Where.LAST_PERIOD]:
-                return Status.DONE
-            where[Where.PERIOD] += 1
-            state[State.TIME] -= t_end
-            continue
-        target = next_target(where, state, env[2], origin, t_end)
-        status = Status.PAUSED
-        if where[Where.MODE] == Mode.ARC:
-            status = arc(where, state, settings, env, model, work, steps, events, origin, target)
-        elif where[Where.SIDES] > 0 and where[Where.MODE] == Mode.CONTACT:
-            status = decide(where, state, settings, env, model, work, steps, events, origin, t_end)
-        elif where[Where.SIDES] > 0:
-            held(where, state, settings, env, model, work, steps, origin, target)
-        if status != Status.PAUSED:
-            return status
+def begin(motion):
+    """Nothing has to be prepared for the steps of a call."""
+
+
+@lean_jit
+def is_smooth(motion):
+    """Whether a motion is on a smooth arc, which begins at most with a gap that has just opened."""
+    return motion.mode == Mode.ARC and motion.skip <= 1
+
+
+@lean_jit
+def waits(motion):
+    """Whether a decision is due before the motion may end."""
+    return False
+
+
+@lean_jit
+def one_pass(motion, target, t_end):
+    """A step up to `target` at most, or a decision. Returns PAUSED, or why the motion ends."""
+    if motion.mode == Mode.ARC:
+        return arc(motion, target)
+    if motion.sides > 0 and motion.mode == Mode.CONTACT:
+        return decide(motion, t_end)
+    if motion.sides > 0:
+        held(motion, target)
     return Status.PAUSED
 
 
-@cached_jit(ADVANCE)
-def advance(where, state, settings, env, model, steps, events):
-    """Advance a motion until it ends, a buffer is full, or a batch of steps is done; returns the reason.
-
-    All of the motion's state is in `where` and `state`, so a call goes on where the last one stopped.
-    """
-    return advance_with(where, state, settings, env, model, work_arrays(where), steps, events)
+@jit
+def parts_of(numbers, state, env, functions, rows, buffers):
+    """The memory of a motion but for its numbers as one named tuple; there are no rows of contacts."""
+    return OneContactParts(state, env, env[0], env[2], functions, step_arrays(numbers), buffers[0], buffers[1])

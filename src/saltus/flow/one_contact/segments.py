@@ -14,10 +14,11 @@ import math
 import numpy as np
 
 from saltus.flow.kernel.function_types import IMPACT_EQUATIONS, SEGMENTS
-from saltus.flow.kernel.layout import ROUGHER, Geometry, ModelPart, SegmentColumn, SegmentValue, Setting, Where, Work
-from saltus.flow.kernel.memory_layout import EventCode, State
+from saltus.flow.kernel.layout import Geometry, SegmentColumn, SegmentValue
+from saltus.flow.kernel.memory import MotionMemory, OneContactSegmentParts
+from saltus.flow.kernel.memory_layout import EventCode
 from saltus.flow.kernel.roots import NOISE, SIMPLE, contact_root, excluded, horner, roots_within, scale_gap
-from saltus.flow.kernel.steps import column_step, expand, leaps, move, step_size, work_arrays
+from saltus.flow.kernel.steps import column_step, columns_at_event, expand, leaps, move, state_arrays, step_arrays, step_size
 from saltus.flow.one_contact.impacts import rate_of, set_state
 from saltus.flow.one_contact.sides import side_of_state
 from saltus.taylor import by_reference, cached_jit, jit, lean_jit
@@ -33,50 +34,51 @@ SHORT = 1e-6  # a segment's duration below which the derivatives of its quotient
 
 
 @lean_jit
-def extremes_of_other(q, v, h, order, roots, poly, seen):
+def widen(seen, x):
+    """Let the range of the coordinates contain a value."""
+    seen[SegmentColumn.HIGHEST], seen[SegmentColumn.LOWEST] = (
+        max(seen[SegmentColumn.HIGHEST], x),
+        min(seen[SegmentColumn.LOWEST], x),
+    )
+
+
+@lean_jit
+def extremes_of_other(motion, a, h, roots, seen):
     """Update the extremes with the range of a coordinate that has no contact."""
-    scale_gap(v, 0, order, h, poly)
+    order, poly, q = motion.order, motion.polynomial, motion.coordinate_series[a]
+    scale_gap(motion.velocity_series[a], 0, order, h, poly)
     size = 0.0
     for k in range(order + 1):
         size += abs(poly[k])
     for i in range(roots_within(poly, order, roots, NOISE * size) + 2):
         x = q[0] if i == 0 else horner(q, order, h if i == 1 else roots[i - 2] * h)
-        seen[SegmentColumn.HIGHEST], seen[SegmentColumn.LOWEST] = (
-            max(seen[SegmentColumn.HIGHEST], x),
-            min(seen[SegmentColumn.LOWEST], x),
-        )
+        widen(seen, x)
 
 
 @lean_jit
-def extremes_in_step(where, model, work, side, t, h, order, roots, seen):
+def extremes_in_step(motion, side, t, h, roots, seen):
     """Update the extremes with a step of a segment: extrema of the coordinates, minima of the gap and of the margins."""
-    q, v, m, poly = work[Work.POSITIONS], work[Work.VELOCITIES], work[Work.MARGINS], work[Work.POLYNOMIAL]
-    seen[SegmentColumn.HIGHEST], seen[SegmentColumn.LOWEST] = (
-        max(seen[SegmentColumn.HIGHEST], q[0, 0]),
-        min(seen[SegmentColumn.LOWEST], q[0, 0]),
-    )
-    scale_gap(v[0], 0, order, h, poly)
-    rate = rate_of(model, side) if where[Where.SIDES] > 0 else 1.0
-    seen[SegmentColumn.DEEPEST] = max(seen[SegmentColumn.DEEPEST], rate * (q[0, 0] - model[ModelPart.GEOMETRY][Geometry.CONTACT]))
+    q, m, order, poly = motion.coordinate_series, motion.margin_series, motion.order, motion.polynomial
+    widen(seen, q[0, 0])
+    scale_gap(motion.velocity_series[0], 0, order, h, poly)
+    rate = rate_of(motion, side) if motion.sides > 0 else 1.0
+    seen[SegmentColumn.DEEPEST] = max(seen[SegmentColumn.DEEPEST], rate * (q[0, 0] - motion.geometry[Geometry.CONTACT]))
     size = 0.0
     for k in range(order + 1):
         size += abs(poly[k])
     for i in range(roots_within(poly, order, roots, NOISE * size)):
         x = horner(q[0], order, roots[i] * h)
-        seen[SegmentColumn.HIGHEST], seen[SegmentColumn.LOWEST] = (
-            max(seen[SegmentColumn.HIGHEST], x),
-            min(seen[SegmentColumn.LOWEST], x),
-        )
-        gap = rate * (x - model[ModelPart.GEOMETRY][Geometry.CONTACT])
+        widen(seen, x)
+        gap = rate * (x - motion.geometry[Geometry.CONTACT])
         seen[SegmentColumn.DEEPEST] = max(seen[SegmentColumn.DEEPEST], gap)
         turn = 0.0
         for k in range(order, 0, -1):
             turn = turn * roots[i] + k * poly[k]
-        if where[Where.SIDES] > 0 and rate * turn > 0.0 and gap < seen[SegmentColumn.LOWEST_GAP]:
+        if motion.sides > 0 and rate * turn > 0.0 and gap < seen[SegmentColumn.LOWEST_GAP]:
             seen[SegmentColumn.LOWEST_GAP], seen[SegmentColumn.LOWEST_GAP_TIME] = gap, t + roots[i] * h
-    for a in range(1, where[Where.OWN]):
-        extremes_of_other(q[a], v[a], h, order, roots, poly, seen)
-    for j in range(where[Where.MARGINS]):
+    for a in range(1, motion.own):
+        extremes_of_other(motion, a, h, roots, seen)
+    for j in range(motion.margin_count):
         scale_gap(m[j], 0, order, h, poly)
         poly[0] -= seen[SegmentColumn.LEAST_MARGIN + j]
         if excluded(poly, order):
@@ -91,128 +93,117 @@ def extremes_in_step(where, model, work, side, t, h, order, roots, seen):
 
 
 @lean_jit
-def start_by_impact(where, state, env, model, work, t, side, speed):
+def start_by_impact(motion, t, side, speed):
     """The state just after an impact, with the columns for d/d(speed), d/d(start) and the parameters; returns (side, dv+/dt)."""
-    inward = -math.copysign(1.0, rate_of(model, side))
-    coordinates, velocities = State.COORDINATES, State.COORDINATES + where[Where.DOF]
-    for j in range(2 * where[Where.DOF]):
-        state[coordinates + j] = 0.0
-    state[velocities], state[velocities + 1] = inward * speed, inward
-    next_side, after = model[ModelPart.RESET](t, 0.0, inward * speed, side, env, 0)
-    model[ModelPart.TANGENT](EventCode.RESET_SLOPES, 0, t, 0.0, side, env, 0, state)
-    set_state(where, state, model[ModelPart.GEOMETRY][Geometry.CONTACT], after)
-    drift = state[velocities + where[Where.DOF] + 1]
-    expand(where, state, env, model, work, t, 0.0, next_side, 0)
-    state[coordinates + 2] = -state[velocities]  # the column of the start: the term of the equation of motion
-    state[velocities + 2] = drift - work[Work.ACCELERATIONS][0, 0]
+    inward = -math.copysign(1.0, rate_of(motion, side))
+    for j in range(2 * motion.dof):
+        motion.state[j] = 0.0
+    motion.velocities[0], motion.velocities[1] = inward * speed, inward
+    next_side, after = motion.reset(t, motion.origin, inward * speed, side, motion.env, motion.piece)
+    columns_at_event(motion, EventCode.RESET_SLOPES, 0, t, side)
+    set_state(motion, motion.geometry[Geometry.CONTACT], after)
+    drift = motion.shifts[1]
+    expand(motion, t, next_side, 0)
+    motion.coordinates[2] = -motion.velocities[0]  # the column of the start: the term of the equation of motion
+    motion.velocities[2] = drift - motion.acceleration_series[0, 0]
     return next_side, drift
 
 
 @lean_jit
-def start_from_state(where, state, env, model, work, t, side, given):
+def start_from_state(motion, t, side, given):
     """A given state, coordinates first, with the unit columns of its own derivatives."""
-    own, coordinates, velocities = where[Where.OWN], State.COORDINATES, State.COORDINATES + where[Where.DOF]
-    for j in range(2 * where[Where.DOF]):
-        state[coordinates + j] = 0.0
+    own = motion.own
+    for j in range(2 * motion.dof):
+        motion.state[j] = 0.0
     for i in range(own):
-        state[coordinates + i], state[velocities + i] = given[i], given[own + i]
-        state[coordinates + own * (1 + i) + i] = state[velocities + own * (1 + own + i) + i] = 1.0
-    expand(where, state, env, model, work, t, 0.0, side, 0)
+        motion.coordinates[i], motion.velocities[i] = given[i], given[own + i]
+        motion.coordinates[own * (1 + i) + i] = motion.velocities[own * (1 + own + i) + i] = 1.0
+    expand(motion, t, side, 0)
 
 
 @lean_jit
-def segment_step(where, settings, env, model, work, t, end, side, size):
+def segment_step(motion, t, end, side, size):
     """The absolute length of the step that the series of a segment allow."""
-    q, v, a = work[Work.POSITIONS], work[Work.VELOCITIES], work[Work.ACCELERATIONS]
-    order, tol = where[Where.ORDER], settings[Setting.TOLERANCE]
-    natural = step_size(v[: where[Where.OWN]], order, size, tol)
-    natural = min(natural, column_step(where, q, v, a, order, ROUGHER * tol))
-    while where[Where.CHECKED] > 0 and end >= t:
-        if not leaps(where, env, model, work, t, 0.0, side, min(natural, end - t), size, tol):
+    natural = step_size(motion.velocity_series[: motion.own], motion.order, size, motion.tolerance)
+    natural = min(natural, column_step(motion))
+    while motion.checked > 0 and end >= t:
+        if not leaps(motion, t, side, min(natural, end - t), size):
             break
         natural = 0.5 * min(natural, end - t)
     return natural
 
 
 @lean_jit
-def follow(where, state, settings, env, model, work, begin, end, side, recording, roots, seen):
+def follow(motion, begin, end, side, roots, seen):
     """Follow one segment. Returns the quotient (x - contact) / duration of its first coordinate, or nan if it cannot be
     followed."""
-    q, v = work[Work.POSITIONS], work[Work.VELOCITIES]
-    order, t, forwards = where[Where.ORDER], begin, end >= begin
+    order, t, forwards, recording = motion.order, begin, end >= begin, seen.size > 1
     quotient = math.nan
     for count in range(MOST_STEPS):
-        size = expand(where, state, env, model, work, t, 0.0, side, order)
-        natural = segment_step(where, settings, env, model, work, t, end, side, size)
+        size = expand(motion, t, side, order)
+        natural = segment_step(motion, t, end, side, size)
         if not natural > 0.0:
             return math.nan
         last = natural >= abs(end - t)
         h = end - t if last else (natural if forwards else -natural)
         if recording and h > 0.0:
-            extremes_in_step(where, model, work, side, t, h, order, roots, seen)
+            extremes_in_step(motion, side, t, h, roots, seen)
         if count == 0 and last:  # from the series itself, because x - contact loses digits in short segments
-            quotient = horner(q[0, 1:], order - 1, h)
-        move(where, state, q, v, h)
+            quotient = horner(motion.coordinate_series[0, 1:], order - 1, h)
+        move(motion, h)
         if last:
-            x = state[State.COORDINATES]
+            x = motion.coordinates[0]
             if recording:
-                seen[SegmentColumn.HIGHEST], seen[SegmentColumn.LOWEST] = (
-                    max(seen[SegmentColumn.HIGHEST], x),
-                    min(seen[SegmentColumn.LOWEST], x),
-                )
-            return quotient if count == 0 else (x - model[ModelPart.GEOMETRY][Geometry.CONTACT]) / (end - begin)
+                widen(seen, x)
+            return quotient if count == 0 else (x - motion.geometry[Geometry.CONTACT]) / (end - begin)
         t += h
     return math.nan
 
 
 @lean_jit
-def pass_contact(where, state, env, model, t, side):
+def pass_contact(motion, t, side):
     """Pass through the contact with unchanged velocity, and transform the tangent; returns the next side, or at a touch this
     one."""
-    place, inward = State.COORDINATES + where[Where.DOF], -math.copysign(1.0, rate_of(model, side))
-    velocity = state[place]
+    inward = -math.copysign(1.0, rate_of(motion, side))
+    velocity = motion.velocities[0]
     if not inward * velocity > 0.0:
-        set_state(where, state, model[ModelPart.GEOMETRY][Geometry.CONTACT], velocity)
+        set_state(motion, motion.geometry[Geometry.CONTACT], velocity)
         return side
-    state[place] = inward * max(inward * velocity, SLOWEST)
-    model[ModelPart.TANGENT](EventCode.IMPACT, 0, t, 0.0, side, env, 0, state)
-    set_state(where, state, model[ModelPart.GEOMETRY][Geometry.CONTACT], velocity)
+    motion.velocities[0] = inward * max(inward * velocity, SLOWEST)
+    columns_at_event(motion, EventCode.IMPACT, 0, t, side)
+    set_state(motion, motion.geometry[Geometry.CONTACT], velocity)
     return -side
 
 
 @lean_jit
-def follow_through(where, state, settings, env, model, work, begin, end, side, recording, roots, seen):
+def follow_through(motion, begin, end, side, roots, seen):
     """Follow one segment through all sides of a continuous contact. Returns the side at its end, or 0 if it cannot be
     followed."""
-    order, t, skip, first = where[Where.ORDER], begin, 0, np.inf
+    order, t, skip, first, recording = motion.order, begin, 0, np.inf, seen.size > 1
     for _ in range(MOST_STEPS):
-        size = expand(where, state, env, model, work, t, 0.0, side, order)
-        natural = segment_step(where, settings, env, model, work, t, end, side, size)
+        size = expand(motion, t, side, order)
+        natural = segment_step(motion, t, end, side, size)
         if not natural > 0.0:
             return 0.0
         h = min(natural, end - t)
-        kind, u, _ = contact_root(work[Work.GAP], skip, order, h, work[Work.POLYNOMIAL])
+        kind, u, _ = contact_root(motion.gap_series, skip, order, h, motion.polynomial)
         tau = u * h if kind == SIMPLE else h
         if recording:
-            extremes_in_step(where, model, work, side, t, tau, order, roots, seen)
-        move(where, state, work[Work.POSITIONS], work[Work.VELOCITIES], tau)
+            extremes_in_step(motion, side, t, tau, roots, seen)
+        move(motion, tau)
         last, t, skip = kind != SIMPLE and h == end - t, t + tau, 0
         if kind == SIMPLE:
-            following = pass_contact(where, state, env, model, t, side)
+            following = pass_contact(motion, t, side)
             if recording and following != side:
-                if (
-                    seen[SegmentColumn.CROSSINGS] == 0.0
-                ):  # on an orbit, the arc before the first passage continues the one after the last
+                if seen[SegmentColumn.CROSSINGS] == 0.0:
+                    # On an orbit, the arc before the first passage continues the one after the last.
                     first = seen[SegmentColumn.DEEPEST]
                 else:
                     seen[SegmentColumn.SHALLOWEST] = min(seen[SegmentColumn.SHALLOWEST], seen[SegmentColumn.DEEPEST])
                 seen[SegmentColumn.CROSSINGS], seen[SegmentColumn.DEEPEST] = seen[SegmentColumn.CROSSINGS] + 1.0, -np.inf
             side, skip = following, 1
         if recording:
-            seen[SegmentColumn.HIGHEST], seen[SegmentColumn.LOWEST] = (
-                max(seen[SegmentColumn.HIGHEST], state[State.COORDINATES]),
-                min(seen[SegmentColumn.LOWEST], state[State.COORDINATES]),
-            )
+            widen(seen, motion.coordinates[0])
         if last:
             if recording and seen[SegmentColumn.CROSSINGS] > 0.0:
                 seen[SegmentColumn.SHALLOWEST] = min(seen[SegmentColumn.SHALLOWEST], max(first, seen[SegmentColumn.DEEPEST]))
@@ -221,24 +212,24 @@ def follow_through(where, state, settings, env, model, work, begin, end, side, r
 
 
 @lean_jit
-def copy_state(where, state, work, ends, columns, first):
+def copy_state(motion, ends, columns, first):
     """Put coordinates, velocities and accelerations into `ends` from `first` on, and into `columns` the tangent's columns."""
-    own, coordinates, velocities = where[Where.OWN], State.COORDINATES, State.COORDINATES + where[Where.DOF]
+    own = motion.own
     for i in range(own):
-        ends[first + i], ends[first + own + i] = state[coordinates + i], state[velocities + i]
-        ends[first + 2 * own + i] = work[Work.ACCELERATIONS][i, 0]
-        for j in range(where[Where.COLUMNS]):
-            columns[i, j] = state[coordinates + own * (1 + j) + i]
-            columns[own + i, j] = state[velocities + own * (1 + j) + i]
+        ends[first + i], ends[first + own + i] = motion.coordinates[i], motion.velocities[i]
+        ends[first + 2 * own + i] = motion.acceleration_series[i, 0]
+        for j in range(motion.columns):
+            columns[i, j] = motion.coordinates[own * (1 + j) + i]
+            columns[own + i, j] = motion.velocities[own * (1 + j) + i]
 
 
 @jit
-def follow_segments_with(where, settings, env_of, model_of, arrays, spans, sides, states, ends, columns, extremes):
-    """`follow_segments` with the arrays of `Work`."""
-    dof, own = where[Where.DOF], where[Where.OWN]
-    env, model, work = by_reference(env_of), by_reference(model_of), by_reference(arrays)
-    roots, nothing = np.zeros(where[Where.ORDER] + 2), np.zeros(1)
-    state = np.zeros(State.COORDINATES + 2 * dof + where[Where.COLUMNS])
+def follow_segments_with(numbers, parts, request, results):
+    """`follow_segments` with the parts of the motion's memory in one named tuple."""
+    motion, own = by_reference(MotionMemory(numbers, parts)), numbers.own
+    spans, sides, states = request.spans, request.sides, request.states
+    ends, columns, extremes = results.ends, results.columns, results.extremes
+    roots, nothing = np.zeros(motion.order + 2), np.zeros(1)
     recording = extremes.shape[0] > 0
     for s in range(spans.shape[0]):
         begin, end, side, drift = spans[s, SEGMENT_START], spans[s, SEGMENT_END], float(sides[s, ALONG]), 0.0
@@ -246,47 +237,44 @@ def follow_segments_with(where, settings, env_of, model_of, arrays, spans, sides
             return s
         through = sides[s, BEFORE] == 0 and sides[s, ALONG] == 0
         if through:
-            _, start = side_of_state(where[Where.SIDES], states[s, 0], states[s, own], model[ModelPart.GEOMETRY])
+            _, start = side_of_state(motion.sides, states[s, 0], states[s, own], motion.geometry)
             side = float(start)
         if sides[s, BEFORE] != 0:
-            side, drift = start_by_impact(where, state, env, model, work, begin, float(sides[s, BEFORE]), spans[s, APPROACH])
+            side, drift = start_by_impact(motion, begin, float(sides[s, BEFORE]), spans[s, APPROACH])
         else:
-            start_from_state(where, state, env, model, work, begin, side, states[s])
-        copy_state(where, state, work, ends[s], columns[s, 2 * own :], SegmentValue.FIRST_STATE + 3 * own)
+            start_from_state(motion, begin, side, states[s])
+        copy_state(motion, ends[s], columns[s, 2 * own :], SegmentValue.FIRST_STATE + 3 * own)
         if recording:
             extremes[s] = np.inf
-            extremes[s, SegmentColumn.HIGHEST], extremes[s, SegmentColumn.DEEPEST], extremes[s, SegmentColumn.CROSSINGS] = (
-                -np.inf,
-                -np.inf,
-                0.0,
-            )
+            extremes[s, SegmentColumn.HIGHEST], extremes[s, SegmentColumn.CROSSINGS] = -np.inf, 0.0
+            extremes[s, SegmentColumn.DEEPEST] = -np.inf
         seen = extremes[s] if recording else nothing
         if through:
-            side = follow_through(where, state, settings, env, model, work, begin, end, side, recording, roots, seen)
+            side = follow_through(motion, begin, end, side, roots, seen)
             ends[s, SegmentValue.QUOTIENT] = math.nan if side == 0.0 else 0.0
         else:
-            ends[s, SegmentValue.QUOTIENT] = follow(
-                where, state, settings, env, model, work, begin, end, side, recording, roots, seen
-            )
+            ends[s, SegmentValue.QUOTIENT] = follow(motion, begin, end, side, roots, seen)
         ends[s, SegmentValue.RESET_DRIFT] = drift
-        expand(where, state, env, model, work, end, 0.0, side, 0)
-        copy_state(where, state, work, ends[s], columns[s], SegmentValue.FIRST_STATE)
+        expand(motion, end, side, 0)
+        copy_state(motion, ends[s], columns[s], SegmentValue.FIRST_STATE)
         if not math.isfinite(ends[s, SegmentValue.QUOTIENT]) or not math.isfinite(ends[s, SegmentValue.FIRST_STATE + 2 * own]):
             return s
     return spans.shape[0]
 
 
 @cached_jit(SEGMENTS, nogil=True)
-def follow_segments(where, settings, env, model, spans, sides, states, ends, columns, extremes):
-    """Follow all segments; returns how many could be followed.
+def follow_segments(numbers, env, functions, request, results):
+    """Follow all segments of `request`; returns how many could be followed.
 
     The derivatives of a segment that starts with an impact are to the speed before this impact, to its time and to the
-    parameters; those of a segment that starts from a state (in `states`) are to this state and to the parameters. `columns` has
-    them for the end (first the coordinates, then the velocities), then for the start. `extremes` are recorded unless the array is
-    empty. A segment with the side 0 goes through all sides.
+    parameters; those of a segment that starts from a state (in `states`) are to this state and to the parameters. In `results`,
+    `columns` has them for the end (first the coordinates, then the velocities), then for the start. `extremes` are recorded
+    unless the array is empty. A segment with the side 0 goes through all sides.
     """
-    arrays = work_arrays(where)
-    return follow_segments_with(where, settings, env, model, arrays, spans, sides, states, ends, columns, extremes)
+    record = numbers[0]
+    state = state_arrays(record, np.zeros(2 * record.dof + record.columns))
+    parts = OneContactSegmentParts(state, env, functions, step_arrays(record))
+    return follow_segments_with(record, parts, request, results)
 
 
 @cached_jit(IMPACT_EQUATIONS)

@@ -20,14 +20,12 @@ import numpy as np
 from saltus.continuation import Bounds, Cut, End, TestFunction, Zero
 from saltus.errors import MotionError
 from saltus.flow import (
-    ContactColumn,
     EventCode,
     EventKind,
     SegmentColumn,
     SegmentEnd,
     SegmentExtremes,
     SegmentPlan,
-    load_contact_segments,
 )
 from saltus.orbits.branches.beyond_switching import AFTER_RELEASE, bounces, contact_change, other_events_side
 from saltus.orbits.branches.bifurcations import GRAZING, curve_test, grazing
@@ -203,17 +201,8 @@ class ContactsEquations(OrbitEquations):
         """The arrays that `follow_contact_segments` fills; None where a segment cannot be followed."""
         parameters = self._values.copy()
         parameters[self._places] = values
-        env, model = self._run.structure.prepare(parameters, self._records)
-        n, own, width = len(plan), self.own, 2 * self.own + len(self.paths)
-        contacts = np.zeros((len(self._run.trace.held), len(ContactColumn)), dtype=np.int64)
-        contacts[:, ContactColumn.COORDINATE] = self._run.trace.held
-        ends, columns = np.zeros((n, SegmentEnd.NUMBERS + 10 * own)), np.zeros((n, 2 * own + 1, width))
-        maps = np.zeros((n, 2 * own, width))
-        seen = np.zeros((n if with_extremes else 0, SegmentExtremes.MARGINS + max(1, len(self.margins))))
-        done = load_contact_segments()(
-            self._where, self._settings, env, model, contacts, plan, times, state, ends, columns, maps, seen
-        )
-        return None if done < n else (ends, columns, maps, seen)
+        numbers = self._run.structure.prepare(parameters, self._records)
+        return self._follower.follow_contacts(numbers, (plan, times, state), with_extremes)
 
     def _assembled(
         self,

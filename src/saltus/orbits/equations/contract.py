@@ -13,7 +13,7 @@ import numpy as np
 
 from saltus.continuation import Bounds, Cut, End, TestFunction, Zero
 from saltus.errors import ParameterError
-from saltus.flow import STRUCTURE_SIZES, Motion, Where, program, simulate, taylor_order
+from saltus.flow import Motion, SegmentFollower, program, simulate
 from saltus.orbits.signature import Signature
 from saltus.systems import System, contact_images, numbers
 from saltus.taylor import FREQUENCY, record_table
@@ -176,10 +176,7 @@ class OrbitEquations(ABC):
         self._values = np.array([value for _, value in numbers(system)])
         self._places = [names.index(path) for path in paths]
         self._frequency = names.index(FREQUENCY)
-        self._where = np.zeros(len(Where), dtype=np.int64)
-        self._where[Where.ORDER] = taylor_order(tol)
-        self._where[STRUCTURE_SIZES] = self._run.structure.sizes
-        self._settings, self._records = np.array([0.0, 0.0, tol]), record_table(system, [])
+        self._follower, self._records = SegmentFollower(self._run, tol), record_table(system, [])
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle and copy the arguments only: compiled code is loaded again in the process that reads them."""
@@ -338,7 +335,7 @@ class OrbitEquations(ABC):
     @property
     def own(self) -> int:
         """Degrees of freedom."""
-        return int(self._where[Where.OWN])
+        return self._follower.own
 
     @property
     def margins(self) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from saltus.continuation import Cut, End, TestFunction, Zero
-from saltus.flow import ContactRegularity, EventKind, SegmentColumn, SegmentValue, Where, contact_regularity, load_segments
+from saltus.flow import ContactRegularity, EventKind, SegmentValue, contact_regularity, load_segments
 from saltus.orbits.branches.beyond_grazing import inserted, other_side
 from saltus.orbits.branches.bifurcations import GRAZING, curve_test
 from saltus.orbits.branches.codimension import room
@@ -217,12 +217,9 @@ class OneContactEquations(OrbitEquations):
         """The smooth motion along segments, with its extremes if asked for; None where a segment cannot be followed."""
         parameters = self._values.copy()
         parameters[self._places] = values
-        env, model = self._run.structure.prepare(parameters, self._records)
-        n, own = len(segments.spans), self.own
-        ends, columns = np.zeros((n, SegmentValue.FIRST_STATE + 6 * own)), np.zeros((n, 4 * own, self._where[Where.COLUMNS]))
-        extremes = np.zeros((n if with_extremes else 0, SegmentColumn.LEAST_MARGIN + max(1, self._where[Where.MARGINS])))
-        done = load_segments()[0](self._where, self._settings, env, model, *segments, ends, columns, extremes)
-        return None if done < n else FollowedSegments(ends, columns, extremes, np.sign(model[4][1:]))
+        env, functions = self._run.structure.prepare(parameters, self._records)
+        followed = self._follower.follow((env, functions), segments, with_extremes)
+        return None if followed is None else FollowedSegments(*followed, np.sign(functions.geometry[1:]))
 
     def _segments(self, unknowns: np.ndarray, later: np.ndarray, frequency: float) -> Segments:
         """The segments between the impacts, the last one up to the first impact of the next period."""

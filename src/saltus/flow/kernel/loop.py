@@ -1,0 +1,55 @@
+"""The loop of both scalar kernels: steps, forcing periods, and the reasons to return.
+
+Its compiled part goes into one module with that of `one_contact/kernel.py`, or with that of `contacts/kernel.py`, which has
+functions of the same names.
+"""
+
+from __future__ import annotations
+
+from saltus.flow.kernel.function_types import ADVANCE
+from saltus.flow.kernel.layout import BATCH, Status
+from saltus.flow.kernel.memory import MotionMemory
+from saltus.flow.kernel.steps import next_target, state_arrays
+from saltus.flow.one_contact.kernel import begin, is_smooth, one_pass, parts_of, waits
+from saltus.taylor import by_reference, cached_jit, lean_jit
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+
+@lean_jit
+def advance_with(numbers, parts):
+    """`advance` with the parts of its memory in one named tuple."""
+    motion = by_reference(MotionMemory(numbers, parts))
+    begin(motion)
+    for batch in range(BATCH):
+        if motion.until_smooth > 0 and batch > 0 and is_smooth(motion):
+            return Status.SMOOTH
+        full = motion.recorded_steps >= motion.step_spans.shape[0] - 4
+        if full or motion.recorded_events >= motion.event_values.shape[0] - 4:
+            return Status.FULL
+        motion.origin = motion.period * motion.period_length
+        last = motion.period == motion.last_period
+        t_end = motion.end if last else motion.period_length
+        if motion.time >= t_end and not (last and waits(motion)):
+            if last:
+                return Status.DONE
+            motion.period += 1
+            motion.time -= t_end
+            continue
+        status = one_pass(motion, next_target(motion, t_end), t_end)
+        if status != Status.PAUSED:
+            return status
+    return Status.PAUSED
+
+
+@cached_jit(ADVANCE)
+def advance(numbers, state, env, functions, rows, buffers):
+    """Advance a motion until it ends, a buffer is full, or a batch of steps is done; returns the reason.
+
+    All of the motion's state is in `numbers`, a record MOTION, in `state`, and in the `rows` of contacts and frictions, so that a
+    call goes on where the last one stopped. `env` = (parameters, constants, record breakpoints, record table); `buffers` are
+    those of steps and of events.
+    """
+    record = numbers[0]
+    parts = parts_of(record, state_arrays(record, state), env, functions, rows, buffers)
+    return advance_with(record, parts)

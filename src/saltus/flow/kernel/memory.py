@@ -1,0 +1,254 @@
+"""The memory of the scalar kernels in words.
+
+`motion`, which the compiled functions take, is a named tuple by its address: of a record with the numbers of the motion, the
+arrays of its state, those of a step, the buffers of its records, and the functions of its structure. All of their fields are
+attributes of `motion` itself (see `taylor/numba_types.py`), so that a compiled function reads `motion.time` or
+`motion.velocities[0]`, whichever part they are in.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+_WHOLE, _REAL = np.int64, np.float64
+
+MOTION = np.dtype(
+    [
+        # Where the motion is.
+        ("time", _REAL),  # within the forcing period
+        ("period", _WHOLE),  # the forcing period
+        ("origin", _REAL),  # the time at which it began
+        ("mode", _WHOLE),  # a `Mode`
+        ("side", _WHOLE),
+        ("skip", _WHOLE),  # order of the gap's known zero at the start of an arc; the side just released in CONTACT from rest
+        ("piece", _WHOLE),  # of the records
+        ("new_piece", _WHOLE),  # whether it has just begun, so that the load may have jumped
+        ("rested", _WHOLE),  # whether the motion was at rest or in chatter before
+        ("chatter_speed", _REAL),  # of the gap, while impacts without loss are averaged
+        (
+            "leave_by",
+            _WHOLE,
+        ),  # the side that the caller has chosen for a motion from rest at the contact that is not unique; or 0
+        # What is recorded.
+        ("dense", _WHOLE),  # whether steps are recorded
+        ("recorded_steps", _WHOLE),  # in the buffer
+        ("recorded_events", _WHOLE),  # in the buffer
+        # When it ends.
+        ("last_period", _WHOLE),  # in which the motion ends
+        ("end", _REAL),  # of the motion, as a time within its last forcing period
+        ("period_length", _REAL),
+        (
+            "horizon",
+            _REAL,
+        ),  # for the scalar steps of a lane, which end with its forcing period: the local time at its motion's end
+        ("until_smooth", _WHOLE),  # whether to return as soon as the motion is smooth again (see `lanes/driver.py`)
+        # How it is computed.
+        ("tolerance", _REAL),
+        ("order", _WHOLE),  # of the Taylor series
+        # The sizes of the structure.
+        ("dof", _WHOLE),  # coordinates that are followed, own (1 + columns)
+        ("margin_count", _WHOLE),  # the number of margins at which the motion stops
+        ("workspace_rows", _WHOLE),
+        ("sides", _WHOLE),  # of the contact
+        ("checked", _WHOLE),  # whether steps are checked: the structure has functions with steep changes that a series may miss
+        ("own", _WHOLE),  # the model's own coordinates
+        ("columns", _WHOLE),  # of the tangent
+    ]
+)
+SIZES = ["dof", "margin_count", "workspace_rows", "sides", "checked", "own", "columns"]  # in the order of `Structure.sizes`
+
+
+def motion_record(order: int, sizes: tuple[int, ...]) -> np.ndarray:
+    """The numbers of a motion of a structure, all others 0: an array of one record."""
+    numbers = np.zeros(1, dtype=MOTION)
+    numbers["order"] = order
+    for name, size in zip(SIZES, sizes, strict=True):
+        numbers[name] = size
+    return numbers
+
+
+class MotionMemory(NamedTuple):
+    """What `motion` is the address of."""
+
+    numbers: Any  # a record MOTION
+    parts: Any  # one of the named tuples below whose names end in Parts
+
+
+class StateArrays(NamedTuple):
+    """The state and its parts."""
+
+    state: Any  # all coordinates, including those of the tangent's columns, their velocities, and the shifts
+    coordinates: Any
+    velocities: Any
+    shifts: Any  # of the last event, along each column
+
+
+class StepArrays(NamedTuple):
+    """Taylor coefficients of a step, and the space to compute them."""
+
+    coordinate_series: Any
+    velocity_series: Any
+    acceleration_series: Any
+    gap_series: Any
+    margin_series: Any
+    recurrences: Any
+    polynomial: Any  # scaled to a step of 1
+    pull_series: Any  # the contact accelerations of both sides
+    step_end: Any  # the first five again, evaluated at the end of a step
+
+
+class StepBuffers(NamedTuple):
+    """The recorded steps: (period, side), (local time, length), and the coordinates' series."""
+
+    step_labels: Any
+    step_spans: Any
+    step_series: Any
+
+
+class EventBuffers(NamedTuple):
+    """The recorded events: (period, kind, side, detail), and (local time, velocities before and after, more, shifts)."""
+
+    event_labels: Any
+    event_values: Any
+
+
+class OneContactFunctions(NamedTuple):
+    """The functions of a structure with one contact, and its geometry."""
+
+    series: Any
+    contact_series: Any
+    reset: Any
+    contact_damping: Any
+    geometry: Any
+    tangent: Any
+
+
+class ContactsFunctions(NamedTuple):
+    """The functions of a structure with several contacts, and the contacts' signs."""
+
+    series: Any
+    matrices: Any
+    signs: Any
+    matrix_slopes: Any  # the derivatives, along each column of the tangent, of the numbers that `matrices` fills
+    tangent: Any
+
+
+class OneContactParts(NamedTuple):
+    """A motion of a model with one contact."""
+
+    state_arrays: StateArrays
+    env: Any  # parameters, constants, record breakpoints, record table
+    parameters: Any
+    breaks: Any
+    functions: OneContactFunctions
+    step_arrays: StepArrays
+    step_buffers: StepBuffers
+    event_buffers: EventBuffers
+
+
+class OneContactSegmentParts(NamedTuple):
+    """A segment of an orbit of a model with one contact, of which nothing is recorded."""
+
+    state_arrays: StateArrays
+    env: Any
+    functions: OneContactFunctions
+    step_arrays: StepArrays
+
+
+class SegmentRequest(NamedTuple):
+    """The segments of an orbit of a model with one contact."""
+
+    spans: Any  # (n, 3): begin, end, and the gap's speed before the impact that starts it
+    sides: Any  # (n, 2): the side before that impact (0: starts from a state), and the side of the segment (0: all)
+    states: Any  # (n, 2 own): where it starts, unless by an impact
+
+
+class SegmentResults(NamedTuple):
+    """What is filled for each of these segments."""
+
+    ends: Any  # in the columns of `SegmentValue`
+    columns: Any
+    extremes: Any  # in those of `SegmentColumn`
+
+
+class SolverArrays(NamedTuple):
+    """The arrays in which impacts and closed contacts are solved for."""
+
+    solver_numbers: Any  # filled by `matrices`: mass matrix by rows, E by rows, positions, speeds of the frictions' grounds
+    inverse: Any  # of the mass matrix
+    coupling: Any  # the rates that unit impulses of the contacts give to the gaps, signs included
+    block: Any  # the rows of a linear system, with its right-hand sides behind them
+    reduced: Any  # the coupling of some of the contacts
+    right: Any
+    impulses: Any
+    tried: Any
+    rates: Any  # of the gaps before an impact
+    gaps: Any
+    pulls: Any  # the second derivatives of the gaps with no contact closed
+    falling_gaps: Any  # while an accumulation is followed
+    falling_rates: Any
+    falling_pulls: Any
+    slopes: Any  # a row for each column of the tangent: the derivatives of `solver_numbers`
+    jump: Any  # of the velocities at an impact
+    event_shifts: Any  # by how much an impact, a release or the end of an accumulation moves with each column
+    pull_slopes: Any  # the derivatives of `pulls`, a row for each column
+
+
+class ContactsParts(NamedTuple):
+    """A motion of a model with several contacts."""
+
+    state_arrays: StateArrays
+    env: Any
+    parameters: (
+        Any  # the last ones say in which direction each friction slides, and whether each coordinate is free (1) or held (0)
+    )
+    breaks: Any
+    functions: ContactsFunctions
+    contacts: Any  # a row for each contact, in the columns of `ContactColumn`
+    frictions: Any  # a row for each friction, in the columns of `FrictionColumn`
+    step_arrays: StepArrays
+    solver: SolverArrays
+    step_buffers: StepBuffers
+    event_buffers: EventBuffers
+
+
+class ContactsSegmentParts(NamedTuple):
+    """A segment of an orbit of a model with several contacts, of which nothing is recorded."""
+
+    state_arrays: StateArrays
+    env: Any
+    parameters: Any
+    functions: ContactsFunctions
+    contacts: Any
+    step_arrays: StepArrays
+    solver: SolverArrays
+
+
+class ContactsSegmentRequest(NamedTuple):
+    """The segments of an orbit of a model with several contacts, one after the other."""
+
+    plan: Any  # (n, ...), in the columns of `SegmentPlan`
+    times: Any  # (n + 1,)
+    first: Any  # the state at the first of them
+
+
+class ContactsSegmentResults(NamedTuple):
+    """What is filled for each of these segments."""
+
+    ends: Any  # in the places of `SegmentEnd`
+    columns: Any
+    maps: Any
+    extremes: Any  # in the places of `SegmentExtremes`
+
+
+class LaneImpactParts(NamedTuple):
+    """An impact of a lane, of which nothing but the state is known."""
+
+    state_arrays: StateArrays
+    env: Any
+    parameters: Any
+    functions: ContactsFunctions
+    contacts: Any
+    solver: SolverArrays

@@ -1,0 +1,50 @@
+"""The smooth segments of periodic orbits, followed with their derivatives: what orbits ask of the compiled code."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from saltus.flow.contacts.layout import ContactColumn, SegmentEnd, SegmentExtremes
+from saltus.flow.kernel.compiled import load_contact_segments, load_segments
+from saltus.flow.kernel.layout import SegmentColumn, SegmentValue
+from saltus.flow.kernel.memory import ContactsSegmentResults, SegmentResults, motion_record
+from saltus.flow.kernel.structures import Program, taylor_order
+
+
+class SegmentFollower:
+    """Follows the segments of orbits of one structure at a tolerance; numbers are given with each call."""
+
+    def __init__(self, run: Program, tol: float) -> None:
+        self._run, self._numbers = run, motion_record(taylor_order(tol), run.structure.sizes)
+        self._numbers["tolerance"] = tol
+        record = self._numbers[0]
+        self.own = int(record["own"])  # degrees of freedom
+        self._columns, self._margins = int(record["columns"]), max(1, int(record["margin_count"]))
+
+    def follow(self, numbers: tuple[Any, Any], request: tuple[Any, ...], with_extremes: bool = False) -> SegmentResults | None:
+        """The smooth motions of a model with one contact along the segments of a `SegmentRequest`, with their extremes if asked
+        for; None where a segment cannot be followed.
+
+        `numbers` are those of `Structure.prepare`.
+        """
+        n, own = len(request[0]), self.own
+        ends, columns = np.zeros((n, SegmentValue.FIRST_STATE + 6 * own)), np.zeros((n, 4 * own, self._columns))
+        extremes = np.zeros((n if with_extremes else 0, SegmentColumn.LEAST_MARGIN + self._margins))
+        results = SegmentResults(ends, columns, extremes)
+        return None if load_segments()[0](self._numbers, *numbers, request, results) < n else results
+
+    def follow_contacts(
+        self, numbers: tuple[Any, Any], request: tuple[Any, ...], with_extremes: bool = False
+    ) -> ContactsSegmentResults | None:
+        """The same for a model with several contacts and the segments of a `ContactsSegmentRequest`."""
+        held, n, own = self._run.trace.held, len(request[0]), self.own
+        contacts = np.zeros((len(held), len(ContactColumn)), dtype=np.int64)
+        contacts[:, ContactColumn.COORDINATE] = held
+        ends, columns = np.zeros((n, SegmentEnd.NUMBERS + 10 * own)), np.zeros((n, 2 * own + 1, self._columns))
+        maps = np.zeros((n, 2 * own, self._columns))
+        margins = len(self._run.trace.margins)
+        extremes = np.zeros((n if with_extremes else 0, SegmentExtremes.MARGINS + max(1, margins)))
+        results = ContactsSegmentResults(ends, columns, maps, extremes)
+        return None if load_contact_segments()(self._numbers, *numbers, contacts, request, results) < n else results
