@@ -23,7 +23,7 @@ def searched(system, *, window=None, starts=8):
         ((1,), {"windw": 2}, r"searched\(\) has no argument 'windw'; did you mean 'window'\?$"),
         ((1,), {"region": 2}, r"searched\(\) has no argument 'region'; known here: starts, system, window$"),
         ((), {}, r"searched\(\) missing a required argument: 'system'$"),
-        ((1, 2), {}, r"searched\(\) too many positional arguments$"),
+        ((1, 2), {}, r"searched\(\) too many positional arguments; give the arguments after the first by their names$"),
     ],
 )
 def test_arguments_that_do_not_fit_are_refused_with_the_name_of_the_function(given, named, sentence):

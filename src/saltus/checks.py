@@ -238,8 +238,29 @@ def check_step(step: Any) -> None:
     check_number("step", step, at_least=1e-6, at_most=1.0)
 
 
-def as_numbers(given: Any) -> np.ndarray:
-    """An array of numbers; an empty one for anything else, so that functions that refuse an empty array refuse it too."""
+def check_size(values: Any, name: str | None = None) -> None:
+    """Refuse more values than can be meant before they become an array: a range, or an array that repeats one number, may be
+    longer than the memory.
+
+    Raises
+    ------
+    ParameterError
+        The error has the number of values.
+    """
+    size = values.size if isinstance(values, np.ndarray) else len(values) if hasattr(values, "__len__") else 0
+    if isinstance(size, int) and size > LIMITS.count:
+        raise ParameterError(f"{name or 'a list'} has {size} values, and {LIMITS.count} are the most", name)
+
+
+def as_numbers(given: Any, name: str | None = None) -> np.ndarray:
+    """An array of numbers; an empty one for anything else, so that functions that refuse an empty array refuse it too.
+
+    Raises
+    ------
+    ParameterError
+        There are more of them than can be meant.
+    """
+    check_size(given, name)
     try:
         return np.asarray(given if hasattr(given, "__array__") or not np.iterable(given) else list(given), dtype=float)
     except (TypeError, ValueError):
@@ -254,7 +275,7 @@ def check_axis(name: str, values: Any) -> np.ndarray:
     ParameterError
         Anything but a list of finite increasing numbers; the error has the name.
     """
-    axis = np.atleast_1d(as_numbers(values))
+    axis = np.atleast_1d(as_numbers(values, name))
     if axis.ndim != 1 or not axis.size or not (np.abs(axis) <= LIMITS.value).all() or not (np.diff(axis) > 0).all():
         raise ParameterError(f"{name} must be numbers that rise, each above the one before, got {shown(values)}", name)
     return axis

@@ -92,6 +92,8 @@ def bound_arguments(function: Callable[..., Any], given: tuple[Any, ...], named:
         return signature.bind(*given, **named)
     except TypeError as error:
         sentence, known = str(error), signature.parameters
+        if sentence == "too many positional arguments":
+            sentence += "; give the arguments after the first by their names"
         wrong = next((name for name in named if name not in known), None)
         if wrong is not None and not any(p.kind is p.VAR_KEYWORD for p in known.values()):
             sentence = f"has no argument {wrong!r:.40}; {near(wrong, [name for name in known if name != 'self'])}"

@@ -4,7 +4,7 @@ import numpy as np
 import xarray
 
 from saltus.branch_tables import branch_tables
-from saltus.cli.answer_summary import summarise
+from saltus.cli.summaries import summarise
 
 
 def test_a_branch_that_begins_at_its_own_image_has_the_period_of_its_other_orbits():

@@ -66,7 +66,7 @@ def asked(saltus, tmp_path, monkeypatch):
         pytest.fail("something was computed while the study was checked")
 
     monkeypatch.setattr(command, "computed", begun)
-    monkeypatch.setattr("saltus.cli.simulate_command.simulate_study", begun)
+    monkeypatch.setattr("saltus.cli.run_command.simulate_study", begun)
     monkeypatch.setattr(simulation, "follow", computed)
     monkeypatch.setattr(ensemble, "compile_driver_aside", computed)
 

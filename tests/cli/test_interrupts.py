@@ -10,13 +10,13 @@ import time
 
 import pytest
 
-from saltus.cli import interrupt
-from saltus.cli.interrupt import interruptible
+from saltus.cli import guard
+from saltus.cli.guard import interruptible
 
 
 @pytest.fixture(autouse=True)
 def impatient(monkeypatch):
-    monkeypatch.setattr(interrupt, "REMINDER_AFTER", 0.05)
+    monkeypatch.setattr(guard, "REMINDER_AFTER", 0.05)
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import saltus
-from saltus.cli.answer_summary import summarise
+from saltus.cli.summaries import summarise
 from saltus.config import load_study
 from saltus.errors import ParameterError
 from saltus.orbits import SpecialKind

@@ -94,17 +94,6 @@ def test_a_store_is_removed_and_nothing_else_is(waves_plan, store, tmp_path):
         remove_store(tmp_path / "mine")
 
 
-def forged(store, change):
-    """Change a store's plan, with the right checksums, as whoever means harm would."""
-
-    def change_group(group):
-        plan = json.loads(group["attributes"]["plan"])
-        change(plan)
-        group["attributes"]["plan"] = json.dumps(plan)
-
-    forged_group(store, change_group)
-
-
 def forged_group(store, change):
     """Change a store's metadata, with the right checksums."""
     group = json.loads((store / files.METADATA).read_text())
@@ -112,30 +101,6 @@ def forged_group(store, change):
     (store / files.METADATA).write_text(json.dumps(group))
     (store / files.CHECKSUMS).unlink()
     files.write_checksums(store)
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda plan: plan["axes"]["x"].update(size=0),
-        lambda plan: plan["axes"]["x"].update(size=10**18),
-        lambda plan: plan["axes"]["x"].update(size="7"),
-        lambda plan: plan["axes"]["x"].update(size=7.5),
-        lambda plan: plan["chunk"].update(x=0),
-        lambda plan: plan["chunk"].update(x=-1),
-        lambda plan: plan.update(order=[]),
-        lambda plan: plan.update(order=5),
-        lambda plan: plan.update(axes=[]),
-        lambda plan: plan.update(variables=5),
-        lambda plan: plan.update(variables={"../../etc": {"extra": []}}),
-        lambda plan: plan.update(attrs=[1]),
-        lambda plan: plan["variables"]["height"].update(extra=[["k", 0]]),
-    ],
-)
-def test_a_forged_plan_is_refused(store, change):
-    forged(store, change)
-    with pytest.raises(ParameterError, match="it keeps no plan"):
-        status(store)
 
 
 def test_a_key_that_is_given_twice_is_no_plan(waves_plan, tmp_path):
@@ -180,52 +145,17 @@ PICKLE = {"zarr_format": 2, "dtype": "|O", "filters": [{"id": "vlen-utf8"}, {"id
     "change",
     [
         lambda array: array.update(PICKLE, chunks=array["shape"], fill_value="", order="C", attributes={}),
-        lambda array: array.update(shape=[10**9, 10**9]),
-        lambda array: array.update(shape=[-1, 5]),
-        lambda array: array.update(shape=5),
-        lambda array: array["chunk_grid"]["configuration"].update(chunk_shape=[50_000, 50_000]),
-        lambda array: array.update(data_type="string"),
-        lambda array: array.update(data_type=None),
         lambda array: array.update(codecs=[{"name": "numcodecs.pickle", "configuration": {}}]),
-        lambda array: array.update(codecs=[]),
-        lambda array: array.update(codecs=5),
-        lambda array: array.update(dimension_names=["x", "x"]),
-        lambda array: array.update(storage_transformers=[{"name": "other"}]),
-        lambda array: array.update(node_type="group"),
     ],
 )
-def test_arrays_that_are_not_those_of_the_plan_are_refused_before_zarr_reads_them(store, change, monkeypatch):
-    """Zarr would follow pickles, codecs and sizes of other origin; none of them reaches it."""
+def test_arrays_whose_codecs_could_run_code_are_refused_before_zarr_reads_them(store, change, monkeypatch):
     import zarr
 
     forged_group(store, lambda group: change(group["consolidated_metadata"]["metadata"]["height"]))
     monkeypatch.setattr(zarr, "open_group", lambda *_, **__: pytest.fail("Zarr was given the store"))
     for question in (status, lambda path: status(path, verify=True), open_store, lambda path: open_store(path, partial=True)):
-        with pytest.raises(ParameterError, match=r"no store that saltus has made: .* is not that of its plan|what it says of"):
+        with pytest.raises(ParameterError, match="no store that saltus has made: it has codecs of other programs"):
             question(store)
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda group: group.pop("consolidated_metadata"),
-        lambda group: group.update(consolidated_metadata=5),
-        lambda group: group["consolidated_metadata"]["metadata"].pop("height"),
-        lambda group: group["consolidated_metadata"]["metadata"].update(more=5),
-        lambda group: group.update(zarr_format=2),
-    ],
-)
-def test_a_list_of_other_arrays_is_refused(store, change):
-    forged_group(store, change)
-    with pytest.raises(ParameterError, match=r"no store that saltus has made: .* is not that of its plan"):
-        open_store(store)
-
-
-@pytest.mark.parametrize("fill", ["a", [1], None, "0xg", {}])
-def test_a_forged_fill_value_is_a_sentence(store, fill):
-    forged_group(store, lambda group: group["consolidated_metadata"]["metadata"]["height"].update(fill_value=fill))
-    with pytest.raises(SaltusError, match=r"cannot be read as a Zarr store|damaged|array 'height' is not that"):
-        open_store(store)
 
 
 def test_hundreds_of_thousands_of_chunks_that_are_not_there_are_counted_at_once(tmp_path):

@@ -8,7 +8,8 @@ import subprocess
 import pytest
 
 from saltus.errors import SweepError
-from saltus.sweep import durable_store, run, status
+from saltus.sweep import run, status
+from saltus.sweep import store as stores
 
 
 def _own_disks() -> bool:
@@ -36,7 +37,7 @@ def test_a_disk_that_is_full_is_told_and_the_store_goes_on_once_there_is_room(sc
 def test_the_file_that_did_not_fit_is_not_there(waves_plan, tree, tmp_path, monkeypatch, code):
     """The system fails in the middle of the fourth chunk's file."""
     plan, store = waves_plan(), tmp_path / "store"
-    written, original = [], durable_store.write_durably
+    written, original = [], stores.write_durably
 
     def fails(path, content):
         if path.parents[2].name == "height":  # height/c/0/0
@@ -45,7 +46,7 @@ def test_the_file_that_did_not_fit_is_not_there(waves_plan, tree, tmp_path, monk
             raise OSError(code, os.strerror(code))
         original(path, content)
 
-    monkeypatch.setattr(durable_store, "write_durably", fails)
+    monkeypatch.setattr(stores, "write_durably", fails)
     with pytest.raises(SweepError, match=f"{os.strerror(code).lower()}.*; the chunks before it are kept"):
         run(plan, store)
     assert status(store).done == 3
@@ -61,5 +62,5 @@ def test_a_write_that_fails_leaves_nothing(tmp_path, monkeypatch):
 
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(OSError, match="No space left"):
-        durable_store.write_durably(tmp_path / "c" / "0", b"x" * 100)
+        stores.write_durably(tmp_path / "c" / "0", b"x" * 100)
     assert list((tmp_path / "c").iterdir()) == []

@@ -6,7 +6,7 @@ import signal
 import pytest
 
 from saltus.sweep import run, status, store
-from saltus.sweep.interrupt import deferred_interrupts
+from saltus.sweep.store_files import deferred_interrupts
 
 
 def test_an_interrupt_waits_until_it_is_heeded():

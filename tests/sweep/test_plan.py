@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from saltus.errors import ParameterError
 from saltus.sweep import Variable, run
-from saltus.sweep.chunk_grid import ChunkGrid
-from saltus.sweep.jsonable import as_json, differences
+from saltus.sweep.chunks import ChunkGrid
+from saltus.sweep.plan import as_json, differences
 
 GRID = np.linspace(0.0, 1.0, 4)
 
@@ -36,6 +36,10 @@ GRID = np.linspace(0.0, 1.0, 4)
         ({"chunk": {"x": True}}, "got True"),
         ({"variables": {}}, "at least one variable"),
         ({"variables": {"height": "f8"}}, "must be a Variable, got 'f8'"),
+        ({"chunk": 3}, "chunk must be a dict, got 3"),
+        ({"axes": ("a", "b")}, r"axes must be a dict, got \('a', 'b'\)"),
+        ({"variables": 2}, "variables must be a dict, got 2"),
+        ({"attrs": 1e3}, "attrs must be a dict, got 1000.0"),
         ({"variables": {"x": Variable()}}, "'x' names two things"),
         ({"variables": {"height": Variable(extra=(("y", 2),))}}, "'y' names two things"),
         ({"variables": {"k": Variable(extra=(("k", 2),))}}, "'k' names two things"),

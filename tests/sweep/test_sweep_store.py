@@ -72,11 +72,11 @@ def test_a_function_that_spoils_its_arguments_spoils_no_other_chunk(waves_plan):
 
 
 def test_each_file_is_written_once(waves_plan, monkeypatch, tmp_path):
-    from saltus.sweep import durable_store
+    from saltus.sweep import store
 
     written = []
-    original = durable_store.write_durably
-    monkeypatch.setattr(durable_store, "write_durably", lambda path, content: (written.append(path), original(path, content)))
+    original = store.write_durably
+    monkeypatch.setattr(store, "write_durably", lambda path, content: (written.append(path), original(path, content)))
     run(waves_plan(), tmp_path / "s")
     chunks = [path for path in written if path.parent.name != "c" and "c" in path.parts and tmp_path / "s" in path.parents]
     assert len(chunks) == len(set(chunks)) == 2 * 8

@@ -187,7 +187,7 @@ def _apart(old: Attractor, new: Attractor, led: bool) -> float:
 
 def _values(system: System, path: str, values: Any) -> np.ndarray:
     check_path(system, path)
-    grid = np.atleast_1d(as_numbers(values))
+    grid = np.atleast_1d(as_numbers(values, "values"))
     steps = np.diff(grid)
     if grid.ndim != 1 or not grid.size or not np.isfinite(grid).all() or not ((steps > 0).all() or (steps < 0).all()):
         raise ParameterError(f"values must be numbers of {path} that increase, or that decrease, got {shown(values)}", "values")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.checks import check_count
+from saltus.checks import check_count, check_size
 from saltus.errors import ParameterError
 from saltus.public_functions import Numbers
 
@@ -80,6 +80,7 @@ def zero_one_test(series: Numbers, *, every: int = 1, seed: int = 0, count: int 
     (True, True)
     """
     check_count("every", every, 1)
+    check_size(series, "series")
     try:
         values = np.asarray(series, dtype=float)[:: int(every)] if np.ndim(series) == 1 else np.asarray(series, dtype=float)
     except (TypeError, ValueError):

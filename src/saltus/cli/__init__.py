@@ -9,7 +9,7 @@ import signal
 from typing import Any
 
 from saltus._front_door import front_door
-from saltus.cli.interrupt import INTERRUPTED, INTERRUPTION
+from saltus.cli.guard import INTERRUPTED, INTERRUPTION
 
 __getattr__, __dir__, __all__ = front_door(__name__, __file__)
 

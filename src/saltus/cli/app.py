@@ -85,7 +85,7 @@ def simulate(
     Example: [cyan]saltus simulate study.toml --output runs/first[/]
     """
     with guarded():
-        from saltus.cli.simulate_command import simulate_study
+        from saltus.cli.run_command import simulate_study
 
         simulate_study(study, output, plot)
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from saltus.cli.fact_blocks import Block, Row, block_table
 from saltus.cli.guard import BAD_INPUT, stop
+from saltus.cli.info_command import Block, Row, block_table
 from saltus.errors import ParameterError
 
 if TYPE_CHECKING:

@@ -26,7 +26,8 @@ LONGEST_KIND = 40  # the most characters that are shown of a store's kind
 def print_status(path: Path, verify: bool = False) -> None:
     """Print how far the sweep in the store at `path` is, from its files alone: it may be running, stopped or killed.
 
-    With `verify`, every file is compared with its checksum; `path` may then also be a netCDF file, or a folder of results.
+    Of a folder with stores inside, each is told. With `verify`, every file is compared with its checksum; `path` may then also
+    be a netCDF file.
 
     Raises
     ------
@@ -37,6 +38,11 @@ def print_status(path: Path, verify: bool = False) -> None:
 
     if verify and not (path / "zarr.json").is_file() and (path.suffix != ".zarr" or not path.exists()):
         print_verified(path)
+        return
+    within = sorted(path.rglob("*.zarr")) if path.is_dir() and not (path / "zarr.json").is_file() else []
+    if within:
+        for store in within:
+            print_status(store)
         return
     found = status(path, verify=verify)
     console = Console(highlight=False)

@@ -1,6 +1,5 @@
-from .questions import Ask
+from .questions import Ask, Settings
 from .results import kind_of, load, open_result, save, to_mat
-from .settings import Settings
 from .study import Study, load_study
 
 __all__ = ["Ask", "Settings", "Study", "kind_of", "load", "load_study", "open_result", "save", "to_mat"]

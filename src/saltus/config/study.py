@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from saltus.config.questions import QUESTIONS, Ask, read_ask
-from saltus.config.settings import Settings, read_settings
-from saltus.config.signals import read_load
-from saltus.config.source import Source, read_source
-from saltus.config.types import read_part
+from saltus.config.questions import QUESTIONS, Ask, Settings, read_ask, read_settings
+from saltus.config.readers import Source, read_source
+from saltus.config.system_parts import read_load, read_part
 from saltus.errors import MotionError, ParameterError, SweepError, TraceError, near, shown
 from saltus.systems import System
 

@@ -207,7 +207,7 @@ def _check(system: System, asking: str) -> None:
 
 
 def _numbers(amplitudes: Any) -> np.ndarray:
-    grid = np.atleast_1d(as_numbers(amplitudes))
+    grid = np.atleast_1d(as_numbers(amplitudes, "amplitudes"))
     if grid.ndim != 1 or not grid.size or not np.isfinite(grid).all():
         raise ParameterError(f"amplitudes must be finite numbers, got {shown(amplitudes)}", "amplitudes")
     return grid

@@ -1,4 +1,4 @@
-from .chunk_results import Failure
+from .chunks import Failure
 from .cluster import on_cluster
 from .execution import SweepInterrupted, check_run, run
 from .memo import Memo, MemoKind

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from saltus.errors import SweepError
-from saltus.sweep.chunk_grid import Index
-from saltus.sweep.chunk_results import Computation, Raised, attempt
-from saltus.sweep.interrupt import deferred_interrupts
+from saltus.sweep.chunks import Computation, Index, Raised, attempt
+from saltus.sweep.store_files import deferred_interrupts
 
 
 @dataclass(frozen=True)

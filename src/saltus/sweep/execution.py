@@ -5,18 +5,18 @@ from __future__ import annotations
 import logging
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import closing, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from saltus.checks import check_count
 from saltus.errors import ParameterError, SweepError
 from saltus.progress import Progress, silent
 from saltus.public_functions import answered
-from saltus.sweep.chunk_grid import Index
-from saltus.sweep.chunk_results import Computation, Failure, Raised, attempt, checked
-from saltus.sweep.memory import MemoryResults
+from saltus.sweep.chunks import Arrays, Computation, Failure, Index, Raised, attempt, checked
 from saltus.sweep.plan import Plan
 from saltus.sweep.store import Store, opened
 
@@ -116,6 +116,39 @@ def run(
             raise SweepInterrupted(f"interrupted after {sweep.done} of {sweep.total} chunks; {kept}") from None
         sweep.conclude()
         return results.dataset()
+
+
+class MemoryResults:
+    """The arrays of a plan, in memory, with the interface of a `Store`."""
+
+    path = None
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self.arrays = {name: np.full(plan.shape(name), v.fill, dtype=v.dtype) for name, v in plan.variables.items()}
+
+    def missing(self) -> list[Index]:
+        """All chunks."""
+        return list(self.plan.chunks.indices())
+
+    def write(self, index: Index, values: Arrays) -> None:
+        """Keep a chunk."""
+        cut = self.plan.chunks.slices(index)
+        for name, array in self.arrays.items():
+            array[cut] = values[name]
+
+    def note(self, failures: Iterable[Failure]) -> None:
+        """Do nothing: in memory, nobody could read a list of failures while the sweep runs."""
+
+    def dataset(self) -> xarray.Dataset:
+        """The dataset of all chunks that were computed."""
+        import xarray
+
+        variables = {
+            name: (self.plan.dimensions(name), array, self.plan.variables[name].attrs) for name, array in self.arrays.items()
+        }
+        axes = {name: (name, values.copy()) for name, values in self.plan.axes.items()}
+        return xarray.Dataset(variables, coords=axes, attrs=self.plan.attributes)
 
 
 class _SweepRun:

@@ -23,8 +23,7 @@ import numpy as np
 from saltus.errors import ParameterError, SweepError
 from saltus.files import checked_content, sealed, write_durably
 from saltus.progress import Progress, silent
-from saltus.sweep.chunk_grid import Index
-from saltus.sweep.chunk_results import Raised
+from saltus.sweep.chunks import Index, Raised
 from saltus.sweep.execution import SweepInterrupted, outcomes
 from saltus.sweep.memo_files import FOLDER, SUFFIX, files_of, packed, unpacked
 

@@ -18,13 +18,9 @@ from saltus.errors import ParameterError, SweepError, shown
 from saltus.files import write_durably
 from saltus.public_functions import answered
 from saltus.sweep import store_files as files
-from saltus.sweep.chunk_grid import Index
-from saltus.sweep.chunk_results import Arrays, Failure
-from saltus.sweep.interrupt import deferred_interrupts
-from saltus.sweep.jsonable import differences
-from saltus.sweep.plan import Plan
-from saltus.sweep.store_status import damage, read_plan, status
-from saltus.sweep.verification import damaged_chunks
+from saltus.sweep.chunks import Arrays, Failure, Index
+from saltus.sweep.plan import Plan, differences
+from saltus.sweep.store_status import damage, damaged_chunks, read_plan, status
 
 if TYPE_CHECKING:
     import xarray
@@ -278,8 +274,23 @@ def reason(error: OSError) -> str:
 
 
 def _zarr_store(folder: Path) -> Any:
-    """Zarr's store in a folder; Zarr is imported only where it is needed."""
-    from saltus.sweep.durable_store import DurableStore
+    """Zarr's store in a folder, in which every file is flushed to the disk before it gets its name.
+
+    Zarr's own store also writes a file under another name and renames it, but does not wait for the disk, so that after a power
+    failure a name may stand without its content. Here a name means that the chunk is done.
+    """
+    import asyncio
+
+    from zarr.storage import LocalStore
+
+    class DurableStore(LocalStore):
+        async def set(self, key: str, value: Any) -> None:
+            self._check_writable()
+            await asyncio.to_thread(write_durably, self.root / key, value.to_bytes())
+
+        def set_sync(self, key: str, value: Any) -> None:
+            self._check_writable()
+            write_durably(self.root / key, value.to_bytes())
 
     return DurableStore(folder)
 
@@ -297,7 +308,7 @@ def _create(plan: Plan, path: Path) -> None:
 
     Ctrl-C waits until it is made: Zarr writes in a thread of its own, which would go on writing into a folder that is removed.
     """
-    with deferred_interrupts() as raise_if_interrupted:
+    with files.deferred_interrupts() as raise_if_interrupted:
         try:
             part = files.begin(path)
             try:

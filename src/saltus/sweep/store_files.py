@@ -8,16 +8,18 @@ import json
 import os
 import secrets
 import shutil
+import signal
 import stat
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from saltus.files import PART, STALE, lock, parsed_json, write_durably
-from saltus.sweep.chunk_grid import Index
+from saltus.sweep.chunks import Index
 
 METADATA = "zarr.json"
 FAILURES = ".failures.json"
@@ -200,3 +202,30 @@ def in_use(path: Path) -> bool | None:
     except OSError:
         return None
     return None if got is None else not got
+
+
+@contextlib.contextmanager
+def deferred_interrupts() -> Iterator[Callable[[], None]]:
+    """A context in which Ctrl-C raises nothing at once; the function that it yields raises KeyboardInterrupt if there was one.
+
+    Python would raise it wherever the main thread happens to be: in a destructor of another library, where it is lost, or while a
+    lock is being taken. Outside the main thread signals do not arrive, and the context changes nothing.
+    """
+    seen: list[int] = []
+
+    def raise_if_interrupted() -> None:
+        if seen:
+            raise KeyboardInterrupt
+
+    def remember(number: int, _: Any) -> None:
+        seen.append(number)
+
+    try:
+        before = signal.signal(signal.SIGINT, remember)
+    except ValueError:
+        yield raise_if_interrupted
+        return
+    try:
+        yield raise_if_interrupted
+    finally:
+        signal.signal(signal.SIGINT, before)

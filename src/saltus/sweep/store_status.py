@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import datetime
+import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,12 +16,11 @@ from saltus.errors import ParameterError
 from saltus.files import parsed_json
 from saltus.public_functions import answered
 from saltus.sweep import store_files as files
-from saltus.sweep.chunk_grid import MOST_CHUNKS, NAME, ChunkGrid, Index
-from saltus.sweep.chunk_results import Failure
+from saltus.sweep.chunks import ChunkGrid, Failure, Index
 from saltus.sweep.memo_files import memo_status
-from saltus.sweep.store_arrays import check_arrays
-from saltus.sweep.verification import damaged_chunks
 
+CODECS = {"bytes", "zstd", "crc32c"}  # as a store is made
+BYTES_AT_ONCE = 256e6  # bytes of chunks that are read together, which is faster than reading them one by one
 NAMED = 3  # damaged files that a sentence names
 
 
@@ -197,13 +197,21 @@ def read_plan(path: Path) -> dict[str, Any]:
     try:
         plan = parsed_json(group["attributes"]["plan"])
         plan = {key: plan[key] for key in ("function", "arguments", "order", "axes", "chunk", "variables", "attrs")}
-        chunks = grid_of(plan)
+        grid_of(plan)
     except (RecursionError, KeyError, TypeError, ValueError, AttributeError):
         raise ParameterError(f"{path} is a Zarr store, but not of a sweep: it keeps no plan", "path") from None
     if damaged:
         raise ParameterError(f"{path / damaged[0]} is damaged; run the sweep again, or remove the store and begin anew", "path")
-    check_arrays(str(path), group, plan, chunks)
+    _check_codecs(path, group)
     return plan
+
+
+def _check_codecs(path: Path, group: dict[str, Any]) -> None:
+    """Refuse arrays that are not read by the codecs of saltus alone: Zarr's older format may hold pickles, which run code."""
+    arrays = group.get("consolidated_metadata", {}).get("metadata", {}).values()
+    known = all(array.get("zarr_format") == 3 and {codec["name"] for codec in array["codecs"]} <= CODECS for array in arrays)
+    if group.get("zarr_format") != 3 or not known:
+        raise ParameterError(f"{path} is no store that saltus has made: it has codecs of other programs", "path")
 
 
 def grid_of(plan: dict[str, Any]) -> ChunkGrid:
@@ -221,14 +229,46 @@ def grid_of(plan: dict[str, Any]) -> ChunkGrid:
         No plan can have such a grid.
     """
     sizes = {str(name): plan["axes"][name]["size"] for name in plan["order"]}
-    chunks = ChunkGrid(sizes, {name: plan["chunk"][name] for name in sizes})
-    counts = [*sizes.values(), *chunks.chunk.values(), *(size for v in plan["variables"].values() for _, size in v["extra"])]
-    texts = [plan["function"], *plan["variables"], *sizes]
-    whole = all(isinstance(count, int) and not isinstance(count, bool) and count > 0 for count in counts)
-    named = all(NAME.fullmatch(name) for name in texts[1:]) and isinstance(plan["function"], str)
-    if not (sizes and plan["variables"] and whole and named and isinstance(plan["attrs"], dict)) or chunks.total > MOST_CHUNKS:
-        raise ValueError
-    return chunks
+    return ChunkGrid(sizes, {name: plan["chunk"][name] for name in sizes})
+
+
+def damaged_chunks(path: Path, arrays: Any, chunks: ChunkGrid, extra: dict[str, int]) -> Iterator[tuple[str, Index]]:
+    """The (variable, chunk) of every chunk in the store at `path` that is there and cannot be read.
+
+    Parameters
+    ----------
+    path
+        The path of the store.
+    arrays
+        Zarr's array of each variable.
+    chunks
+        The division of the grid into chunks.
+    extra
+        The number of dimensions of each variable beside the grid's axes.
+    """
+    for name, count in extra.items():
+        array, found = arrays[name], files.chunks_of(path, name, chunks.grid, count).there
+        for i, row in enumerate(found):
+            there: list[Index] = [(i, *map(int, index)) for index in np.argwhere(row)]
+            if not there:
+                continue
+            rows = chunks.slices(there[0])[0]
+            if row.all() and _row_size(array, rows) < BYTES_AT_ONCE and _can_be_read(array, (rows,)):
+                continue
+            yield from ((name, index) for index in there if not _can_be_read(array, chunks.slices(index)))
+
+
+def _row_size(array: Any, rows: slice) -> float:
+    """The size of some rows in bytes, according to the array's metadata."""
+    return float(float(rows.stop - rows.start) * math.prod(map(float, array.shape[1:])) * array.dtype.itemsize)
+
+
+def _can_be_read(array: Any, cut: tuple[slice, ...]) -> bool:
+    try:
+        array[cut]
+    except Exception:  # errors may come from Zarr, from its codecs or from the system
+        return False
+    return True
 
 
 def _failures(path: Path) -> tuple[Failure, ...]:

@@ -11,8 +11,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from saltus.errors import SweepError
-from saltus.sweep.chunk_grid import Index
-from saltus.sweep.chunk_results import Computation, Raised, attempt
+from saltus.sweep.chunks import Computation, Index, Raised, attempt
 
 READY = "ready"
 

@@ -49,7 +49,7 @@ def check_window(window: Any, system: System) -> Window:
     names = system.model.coordinates
     if window is None:
         return _default_window(system)
-    bounds = as_numbers(window)
+    bounds = as_numbers(window, "window")
     single = len(names) == 1
     sound = bounds.shape == (2 * len(names), 2) and (np.abs(bounds) <= LIMITS.value).all()
     if not sound or not ((bounds[:, 0] < bounds[:, 1]) if single else (bounds[:, 0] <= bounds[:, 1])).all():

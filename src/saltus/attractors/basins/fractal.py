@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.attractors.attractor import UNDECIDED
-from saltus.checks import check_count
+from saltus.checks import check_count, check_size
 from saltus.errors import ParameterError
 from saltus.public_functions import Numbers, answered
 from saltus.result import Result, result_dataset
@@ -339,6 +339,7 @@ def wada(labels: Numbers, radius: int = FRACTAL.radius) -> Wada:
 
 def _labels(labels: Any) -> np.ndarray:
     """The labels as an array of whole numbers, of one or two dimensions."""
+    check_size(labels, "labels")
     try:
         array = np.asarray(labels)
         grid = array.astype(int)

@@ -394,7 +394,7 @@ def _values(bounds: tuple[float, float], values: Iterable[float] | None, count: 
     """The values at which motions are simulated, in order: those given, or `count` values from bound to bound."""
     if values is None:
         return np.linspace(*bounds, count)
-    grid = as_numbers(values)
+    grid = as_numbers(values, "values")
     if grid.ndim != 1 or not grid.size:
         raise ParameterError(f"values must be numbers at which to search, got {shown(values)}", "values")
     outside = grid[~((grid >= bounds[0]) & (grid <= bounds[1]))]
