@@ -131,7 +131,7 @@ quantity = "velocity"
     assert load_study(path).system == System(model=RockingBlock(alpha=0.2), load=Load(ground_horizontal=pulse))
     path.write_text(text.replace("MavroeidisPapageorgiou", "HalfSin"))
     with pytest.raises(
-        ParameterError, match=r"study.toml, line 6: load.ground_horizontal.type .HalfSin. is no pulse; did you mean 'HalfSine'"
+        ParameterError, match=r"study.toml: load.ground_horizontal.type .HalfSin. is no pulse; did you mean 'HalfSine'"
     ):
         load_study(path)
 
