@@ -71,7 +71,7 @@ def number_problem(
     unit: str = "",
 ) -> str | None:
     """What is wrong with a value that must be a finite real number within bounds, such as "must lie in [0, 1], got 2"."""
-    number = isinstance(value, (float, int, np.floating, np.integer)) and not isinstance(value, bool)
+    number = isinstance(value, (float, int, np.floating, np.integer)) and not isinstance(value, (bool, np.timedelta64))
     if number and isinstance(value, int) and abs(value) > sys.float_info.max:
         value = math.inf
     inside = (

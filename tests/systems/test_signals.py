@@ -13,7 +13,7 @@ from scipy.integrate import quad
 from scipy.interpolate import CubicSpline
 
 from saltus.errors import ParameterError
-from saltus.systems import Constant, Harmonic, Load, Record, Sum
+from saltus.systems import Constant, Harmonic, Load, Record, Sum, System
 
 number = st.floats(-5, 5)
 TIMES = np.array([0.5, 0.9, 1.6, 2.0, 3.1, 3.3])
@@ -160,7 +160,11 @@ def test_impossible_records_are_refused_in_a_sentence(time, value, options, mess
         (lambda: Harmonic(1.0, order=True), "order"),
         (lambda: Harmonic("0.5"), "amplitude must be"),
         (lambda: Sum(()), "a Sum needs signals"),
-        (lambda: Sum((0.5,)), "a Sum needs signals"),
+        (lambda: Sum(0.5), "a Sum needs signals"),
+        (lambda: Load(force=[]), "load.force is an empty list"),
+        (lambda: Load(force=[0.5, [Harmonic]]), "load.force.1.0 must be a finite number"),
+        (lambda: Record([-1e308, 1e308], [0.0, 1.0]), r"times and values must be at most 1e\+100 in size, got 1e\+308"),
+        (lambda: Record([0.0, 1e-320], [0.0, 1e10]), "samples 0 and 1 are too near in time"),
         (lambda: Load(horizontal=Harmonic(0.5)), "load.horizontal is harmonic, so load.frequency must be given"),
         (lambda: Load(horizontal=0.5 + Harmonic(0.5)), "load.horizontal is harmonic"),
         (lambda: Load(frequency=0.0), r"load.frequency must lie in \(0, inf\), got 0.0"),
@@ -191,3 +195,21 @@ def test_a_load_is_frozen():
     assert hash(load) == hash(Load(vertical=-0.5))
     assert eval(repr(load)) == load
     assert pickle.loads(pickle.dumps(load)) == load
+
+
+def test_a_list_is_the_sum_of_its_entries_however_they_are_nested():
+    base, second, gust = Harmonic(0.5), Harmonic(0.1, order=2), Record([0.0, 1.0, 2.0], [0.0, 3.0, 0.0])
+    total = base + second + 0.25 + gust
+    for nested in ([base, second, 0.25, gust], (base, [second, [0.25, gust]]), [[base + second], [[0.25]], gust]):
+        assert Load(frequency=1.0, force=nested) == Load(frequency=1.0, force=total)
+    load = Load(frequency=1.0, force=[base, 0.25])
+    assert load.force(0.7) == base.derivative(0.7, 1.0) + 0.25
+
+
+def test_a_list_in_a_list_on_a_ground_channel_is_read():
+    ground = {"time": [0, 1, 2], "value": [0, 0.1, 0], "quantity": "acceleration"}
+    data = {"model": {"type": "RockingBlock", "alpha": 0.2}, "load": {"ground_horizontal": [[ground]]}}
+    assert System.from_dict(data).load.channels["ground_horizontal"].terms[0].quantity == "acceleration"
+    wrong = {**data, "load": {"ground_horizontal": [[{**ground, "quantity": "force"}]]}}
+    with pytest.raises(ParameterError, match=r"load\.ground_horizontal takes a record of displacement, velocity or acceleration"):
+        System.from_dict(wrong)

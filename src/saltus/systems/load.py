@@ -69,8 +69,9 @@ class Channel:
 class Load:
     """The loads on a system: `Load(frequency=Omega, horizontal=Harmonic(amplitude=H), vertical=-0.5)`.
 
-    Each channel is a number, a `Harmonic`, a `Record`, a pulse such as `HalfSine`, or a sum of them; a channel that is not named
-    is 0. Channels that begin with `ground_` are displacements of the ground (zeta, nu), all others forces. Frozen.
+    Each channel is a number, a `Harmonic`, a `Record`, a pulse such as `HalfSine`, or a sum of them, which may be written as a
+    list; a channel that is not named is 0. Channels that begin with `ground_` are displacements of the ground (zeta, nu), all
+    others forces. Frozen.
 
     The paper's loads: (i) `loadpatha`, `Load(frequency=W, horizontal=Harmonic(amplitude=H), vertical=-0.5)`;
     (ii) `loadpathaa`, `Load(frequency=W, ground_horizontal=Harmonic(amplitude=z), vertical=-0.5)`; (iii) `loadpathb`,
@@ -81,7 +82,7 @@ class Load:
     frequency
         The base angular frequency Omega > 0 of every harmonic, or None for a load without a period.
     channels
-        A `Signal` or a number for each channel by its name, such as horizontal=-0.5.
+        A `Signal`, a number or a list of them for each channel by its name, such as horizontal=-0.5.
 
     Raises
     ------
@@ -98,7 +99,7 @@ class Load:
     frequency: float | None
     channels: dict[str, Signal]
 
-    def __init__(self, *, frequency: float | None = None, **channels: Signal | float) -> None:
+    def __init__(self, *, frequency: float | None = None, **channels: Signal | float | list[Any] | tuple[Any, ...]) -> None:
         signals = {name: as_signal(value, f"load.{name}") for name, value in channels.items()}
         if frequency is not None:
             check_number("load.frequency", frequency, above=0.0)

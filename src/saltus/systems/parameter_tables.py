@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError, near
+from saltus.checks import LIMITS
+from saltus.errors import ParameterError, near, shown
 from saltus.systems.parameters import numbers
 from saltus.systems.system import System
 
@@ -80,12 +81,14 @@ def finite_array(name: str, given: Any) -> Any:
     """A DataArray or an array of finite numbers."""
     import xarray
 
+    if (size := getattr(given, "size", 0)) > LIMITS.count:
+        raise ParameterError(f"{name} holds {size:.3g} numbers, and {LIMITS.count} are the most", name)
     try:
-        if np.iscomplexobj(given):
+        if np.iscomplexobj(given) or getattr(given, "dtype", np.dtype(float)).kind in "mM":
             raise TypeError
         array = given.astype(float) if isinstance(given, xarray.DataArray) else np.asarray(given, dtype=float)
-    except (TypeError, ValueError):
-        raise ParameterError(f"{name} must be a number or an array of numbers, got {given!r}", name) from None
+    except (TypeError, ValueError, OverflowError):
+        raise ParameterError(f"{name} must be a number or an array of numbers, got {shown(given)}", name) from None
     if not np.isfinite(array).all():
         raise ParameterError(f"{name} must be finite; it holds nan or inf", name)
     return array

@@ -9,7 +9,7 @@ from typing import Any
 from saltus.errors import ParameterError, near, shown
 from saltus.systems.load import Load
 from saltus.systems.pulse import Pulse
-from saltus.systems.signals import Constant, Harmonic, Record, Signal, Sum
+from saltus.systems.signals import Constant, Harmonic, Record, Signal, Sum, as_signal
 
 
 def to_dict(part: Any) -> Any:
@@ -53,10 +53,7 @@ def from_dict(kind: str, data: Any) -> Any:
 def read_signal(data: Any, where: str) -> Any:
     """A number, a table of a `Harmonic`, a `Record` or (with its `type`) a pulse, or a list of them (their sum)."""
     if isinstance(data, (list, tuple)):
-        if not data:
-            raise ParameterError(f"{where} is an empty list; give at least one number, harmonic or record", where)
-        terms = [read_signal(item, f"{where}.{i}") for i, item in enumerate(data)]
-        return Sum(tuple(t if isinstance(t, Signal) else Constant(t) for t in terms))
+        return as_signal([read_signal(item, f"{where}.{i}") for i, item in enumerate(data)], where)
     if isinstance(data, Mapping):
         return build(signal_class(data, where), {key: value for key, value in data.items() if key != "type"}, where)
     return data

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.checks import RADIANS, check_count, check_number, settle_numbers
+from saltus.checks import LIMITS, RADIANS, check_count, check_number, settle_numbers
 from saltus.errors import ParameterError, shown
 
 
@@ -102,13 +102,15 @@ class Harmonic(Signal):
 
 @dataclass(frozen=True, slots=True)
 class Sum(Signal):
-    """The sum of several signals; written `Harmonic(...) + Harmonic(...) + 0.5`."""
+    """The sum of several signals; written `Harmonic(...) + Harmonic(...) + 0.5`, or as a list of them."""
 
     terms: tuple[Signal, ...]
 
     def __post_init__(self) -> None:
-        if not self.terms or not all(isinstance(term, Signal) for term in self.terms):
-            raise ParameterError(f"a Sum needs signals (Harmonic, Record, Constant), got {self.terms!r}")
+        if not isinstance(self.terms, (tuple, list)) or not self.terms:
+            raise ParameterError(f"a Sum needs signals (Harmonic, Record, Constant), got {shown(self.terms)}")
+        terms = (part for term in self.terms for part in _terms(term))
+        object.__setattr__(self, "terms", tuple(terms))
 
     @property
     def periodic(self) -> bool:  # type: ignore[override]
@@ -199,11 +201,21 @@ class Record(Signal):
         if not (np.isfinite(time).all() and np.isfinite(value).all()):
             bad = int(np.argmin(np.isfinite(time) & np.isfinite(value)))
             raise ParameterError(f"{where}: sample {bad} is not a finite number (time {time[bad]}, value {value[bad]})", "value")
+        largest = max(np.abs(time).max(), np.abs(value).max())
+        if largest > LIMITS.value:
+            raise ParameterError(f"{where}: times and values must be at most {LIMITS.value:g} in size, got {largest:g}", "time")
         if not (np.diff(time) > 0).all():
             bad = int(np.argmin(np.diff(time) > 0)) + 1
             raise ParameterError(
                 f"{where}: times must increase, but sample {bad} has {time[bad]:g} after {time[bad - 1]:g}; sort the file",
                 "time",
+            )
+        with np.errstate(over="ignore"):
+            steep = np.abs(np.diff(value) / np.diff(time))
+        if not (steep <= LIMITS.value).all():
+            bad = int(np.argmax(steep))
+            raise ParameterError(
+                f"{where}: samples {bad} and {bad + 1} are too near in time, {np.diff(time)[bad]:g} apart", "time"
             )
         time.setflags(write=False)
         value.setflags(write=False)
@@ -261,15 +273,21 @@ class Record(Signal):
 
 
 def as_signal(value: Any, name: str) -> Signal:
-    """A signal from a number (a `Constant`) or a signal (itself); anything else is refused."""
+    """A signal from a number (a `Constant`), a signal (itself) or a list of them (their sum); anything else is refused."""
     if isinstance(value, Signal):
         return value
+    if isinstance(value, (tuple, list)):
+        if not value:
+            raise ParameterError(f"{name} is an empty list; give at least one number, harmonic or record", name)
+        return Sum(tuple(as_signal(item, f"{name}.{i}") for i, item in enumerate(value)))
     check_number(name, value)
     return Constant(float(value))
 
 
-def _terms(signal: Signal | float) -> tuple[Signal, ...]:
-    return signal.terms if isinstance(signal, Sum) else (as_signal(signal, "a term of a sum"),)
+def _terms(given: Any) -> tuple[Signal, ...]:
+    """The terms of a sum, or a signal as the only one."""
+    signal = as_signal(given, "a term of a sum")
+    return signal.terms if isinstance(signal, Sum) else (signal,)
 
 
 def scaled(signal: Signal, factor: float) -> Signal:
