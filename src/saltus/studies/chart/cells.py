@@ -8,15 +8,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from saltus.attractors import JudgementSettings, judge
-from saltus.flow import Ending, Recurrence, approached, find_recurrence
+from saltus.flow import Ending, Recurrence
 from saltus.studies.chart.chart_request import ChartRequest
-from saltus.studies.chart.motions import ALIKE, SIDES, distinct, has_alike, is_alike, motion_type, motions_in, outcomes, table
+from saltus.studies.chart.motions import (
+    ALIKE,
+    SIDES,
+    distinct,
+    has_alike,
+    is_alike,
+    motion_type,
+    motions_in,
+    motions_later,
+    outcomes,
+    table,
+)
 from saltus.systems import System, Window, initial_states, rest_state, states_beside
 from saltus.theory import amplitude_limits
 
@@ -231,30 +242,12 @@ def _followed(request: ChartRequest, motions: np.ndarray, periods: int) -> tuple
 
     The state of a motion that is about to settle is replaced by its extrapolated limit.
     """
-    motions = motions.copy()
     if not len(motions):
         return motions, np.zeros(0, dtype=int), np.zeros(0)
-    ends = find_recurrence(
-        request.system,
-        motions["state"],
-        periods,
-        parameters={path: values[motions["cell"]] for path, values in request.parameters.items()},
-        max_period=request.max_period,
-        kept=SETTINGS.kept,
-        extrema=True,
-        impact_count=True,
-        speed=request.system.model.names_its_contacts,
-        tol=request.tol,
-    )
-    going, state = ends, ends.last
-    if not request.system.model.holds_coordinates:  # else an extrapolated state may lie beyond a contact
-        ahead, period = approached(ends.states, request.max_period)
-        going = replace(ends, period=np.where(ends.unsettled, period, ends.period))  # its extrema are those of the last period
-        state = np.where(ends.unsettled[:, None], ahead, ends.last)
-    high, low = going.highest, -going.lowest
-    motions["slowest"] = 0.0 if ends.speeds is None else ends.slowest
-    motions["state"], motions["period"], motions["impact_count"] = state, ends.period, ends.impact_count
-    motions["amplitude"], motions["other"] = np.maximum(high, low), np.minimum(high, low)
+    parameters = {path: values[motions["cell"]] for path, values in request.parameters.items()}
+    how: dict[str, Any] = {"max_period": request.max_period, "kept": SETTINGS.kept, "tol": request.tol}
+    motions, ends = motions_later(request.system, motions, periods, parameters, **how)
+    motions["period"] = ends.period
     return motions, ends.outcome, _fading(ends, motions["amplitude"])
 
 

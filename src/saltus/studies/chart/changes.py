@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from saltus.enumerations import NumberedSentence
-from saltus.flow import approached, captured_between, find_recurrence, return_period
-from saltus.studies.chart.motions import ALIKE, SIDES, motion_type, motions_in, read_motions
+from saltus.flow import captured_between
+from saltus.studies.chart.motions import ALIKE, SIDES, motion_type, motions_in, motions_later, read_motions
 from saltus.systems import System, states_beside
 
 if TYPE_CHECKING:
@@ -234,36 +234,12 @@ class Ways:
     def followed(self, rows: np.ndarray, motions: np.ndarray, periods: int) -> tuple[np.ndarray, np.ndarray]:
         """The motions, of `way_type`, at most so many forcing periods later, and whether they have settled."""
         parameters = {path: a[rows] + motions["share"] * (self.end[path][rows] - a[rows]) for path, a in self.start.items()}
-        ends = find_recurrence(
-            self.system,
-            motions["state"],
-            max(periods, 3 * self.max_period),
-            parameters=parameters,
-            captured=self.captured[rows],
-            max_period=self.max_period,
-            kept=2 * self.max_period,
-            extrema=True,
-            impact_count=True,
-            speed=self.system.model.names_its_contacts,
-            tol=self.tol,
-        )
-        ahead = ends.last
-        if not self.system.model.holds_coordinates:  # else an extrapolated state may lie beyond a contact
-            ahead, _ = approached(ends.states, self.max_period)
-        own = len(self.system.model.coordinates)
-        size = np.nanmax(np.abs(ends.states[:, :, :own]), axis=(1, 2), initial=0.0)[:, None]
-        slow = return_period(ends.states, self.max_period, SETTINGS.slow * size)
-        settled = ends.periodic | ends.rest
-        ends = replace(ends, period=np.where(settled, ends.period, slow))
-        found = motions.copy()
-        found["state"], found["period"] = np.where(settled[:, None], ends.last, ahead), ends.period
-        found["impact_count"] = ends.impact_count
-        high, low = ends.highest, -ends.lowest
-        found["amplitude"], found["other"] = np.maximum(high, low), np.minimum(high, low)
-        found["slowest"] = 0.0 if ends.speeds is None else ends.slowest
+        how: dict[str, Any] = {"max_period": self.max_period, "kept": 2 * self.max_period, "tol": self.tol}
+        how |= {"captured": self.captured[rows], "slow": SETTINGS.slow}
+        found, ends = motions_later(self.system, motions, max(periods, 3 * self.max_period), parameters, **how)
         for name in ("period", "impact_count", "amplitude", "other", "slowest"):
             found[name][ends.rest] = 0
-        return found, settled
+        return found, ends.periodic | ends.rest
 
 
 def trace(ways: Ways, least: float) -> np.ndarray:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from saltus.enumerations import NumberedSentence
-from saltus.flow import Ending, state_names
+from saltus.flow import Ending, Recurrence, approached, find_recurrence, return_period, state_names
+from saltus.systems import System
 
 if TYPE_CHECKING:
     import xarray
@@ -52,6 +53,53 @@ class MotionTolerances:
 
 
 ALIKE = MotionTolerances()
+
+
+def motions_later(
+    system: System,
+    motions: np.ndarray,
+    periods: int,
+    parameters: Mapping[str, np.ndarray],
+    *,
+    max_period: int,
+    kept: int,
+    tol: float,
+    captured: np.ndarray | None = None,
+    slow: float = 0.0,
+) -> tuple[np.ndarray, Recurrence]:
+    """The motions, records with the fields of `motion_type`, at most so many forcing periods later; and how they end.
+
+    Motions are followed so in stages by cells and between cells. If one is about to settle its state is the limit to which its
+    last states are extrapolated, so that the next stage begins there, and its extrema are those of the period with which it
+    seems to settle: the one of the extrapolation or, with `slow`, the one after which it returns within this share of its size.
+    """
+    several = system.model.names_its_contacts
+    ends = find_recurrence(
+        system,
+        motions["state"],
+        periods,
+        parameters=parameters,
+        captured=captured,
+        max_period=max_period,
+        kept=kept,
+        extrema=True,
+        impact_count=True,
+        speed=several,
+        tol=tol,
+    )
+    ahead, period = ends.last, np.zeros(len(ends), dtype=int)
+    if not system.model.holds_coordinates:  # else an extrapolated state may lie beyond a contact
+        ahead, period = approached(ends.states, max_period)
+    if slow:
+        own = len(system.model.coordinates)
+        size = np.nanmax(np.abs(ends.states[:, :, :own]), axis=(1, 2), initial=0.0)[:, None]
+        period = return_period(ends.states, max_period, slow * size)
+    seen = replace(ends, period=np.where(ends.unsettled, period, ends.period))
+    later, high, low = motions.copy(), seen.highest, -seen.lowest
+    later["state"], later["period"] = np.where(ends.unsettled[:, None], ahead, ends.last), seen.period
+    later["impact_count"], later["slowest"] = seen.impact_count, seen.slowest if several else 0.0
+    later["amplitude"], later["other"] = np.maximum(high, low), np.minimum(high, low)
+    return later, ends
 
 
 def motions_in(motions: np.ndarray, cell: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
