@@ -14,10 +14,11 @@ from saltus.branch_tables import branch_tables
 from saltus.theory import critical_horizontal, static_angle
 from saltus_paper import ClaimVerdict
 from saltus_paper.figures import fig13
+from saltus_paper.figures.fig09 import static_unit
 from saltus_paper.figures.harmonic_loads import AMPLITUDE, under_both, under_force
 from saltus_paper.figures.knots_and_jumps import birth
 from saltus_paper.figures.load_diagrams import undeformed
-from saltus_paper.measures.response_measures import _anticipated, _static_unit, border_of_rest, coexistence
+from saltus_paper.measures.response_measures import _anticipated, border_of_rest, coexistence
 
 
 @pytest.fixture(scope="module")
@@ -184,4 +185,4 @@ def test_theta_st_is_where_a_slowly_growing_load_leads(amplitude):
     assert reached == pytest.approx(static_angle(math.radians(80), amplitude, -0.5), abs=1e-6)
     for scale, verdict in ((reached, ClaimVerdict.AS_PRINTED), (1.001 * reached, ClaimVerdict.DISAGREES)):
         spectrum = xr.DataTree(xr.Dataset(attrs={"scale": scale}))
-        assert verdicts({"fig09-static": _static_unit({amplitude: spectrum})})["fig09-static"] is verdict
+        assert verdicts({"fig09-static": static_unit({amplitude: spectrum})})["fig09-static"] is verdict

@@ -7,6 +7,7 @@ from spectrum_cases import branch, diagram, folded, loop
 
 from saltus.plots import ModelValidity, branch_lines, response, smooth_lines
 from saltus.plots import conventions as style
+from saltus_paper.figures.zooms import draw_zoom
 
 
 def lines(ax, line):
@@ -162,7 +163,7 @@ def test_dots_of_simulation_lie_where_they_were_found(axes):
 
 
 def test_a_zoom_shows_its_window_of_the_same_data(axes):
-    inset = response.draw_zoom(axes, diagram(folded()), (0.4, 0.4), (1.4, 2.1, 1.0, 2.2))
+    inset = draw_zoom(axes, diagram(folded()), (0.4, 0.4), (1.4, 2.1, 1.0, 2.2))
     assert inset.get_xlim() == (1.4, 2.1)
     assert lines(inset, style.UNSTABLE_LINE)
 

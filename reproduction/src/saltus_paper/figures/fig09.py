@@ -6,13 +6,14 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from saltus.plots import (
     DOUBLE_COLUMN,
     draw_branches,
     draw_limits,
     draw_response,
     draw_special,
-    draw_zoom,
     highest,
     new_figure,
     note_missed,
@@ -20,11 +21,12 @@ from saltus.plots import (
     response_legend,
     styled,
 )
-from saltus_paper.claims.claim import Measured
+from saltus_paper.claims.claim import Measured, measured
 from saltus_paper.figure_data import joined
 from saltus_paper.figures.figure import paper_figure
-from saltus_paper.figures.harmonic_loads import under_force
+from saltus_paper.figures.harmonic_loads import BETA0, VERTICAL, under_force
 from saltus_paper.figures.response_panels import spectrum
+from saltus_paper.figures.zooms import draw_zoom
 from saltus_paper.measures import chaos_measures, response_measures
 from saltus_paper.measures.spectrum_features import detached
 from saltus_paper.measures.validity_measures import validity
@@ -116,7 +118,21 @@ def measure(data: Any) -> dict[str, Measured | None]:
     """Every feature that the text names."""
     panels = {AMPLITUDES[name]: tree for name, tree in data.children.items()}
     found = {**response_measures.force_spectra(panels), **chaos_measures.force_spectra(panels)}
+    found["fig09-static"] = static_unit(panels)
     return {**found, "fig09-validity": validity("Fig. 9", data.children)}
+
+
+def static_unit(panels: Mapping[float, Any]) -> Measured:
+    """The moment (`gov_eqn_theta_long`, k = 1) at theta_st, the `scale` of the spectra, where it first rises through 0."""
+    beta0, residuals, rows = np.deg2rad(BETA0), [], []
+    for load, tree in panels.items():
+        scale = float(tree.attrs["scale"])
+        theta = scale * np.append(np.linspace(0.0, 1.0 - 1e-6, 2000)[1:], (1.0, 1.0 + 1e-6))
+        moment = theta - load * np.sin(beta0 + theta) - VERTICAL * np.cos(beta0 + theta)
+        first = bool((moment[:-2] < 0.0).all()) and moment[-1] > 0.0
+        residuals.append(abs(float(moment[-2])) if first else np.inf)
+        rows.append({"load": load, "angle": float(np.rad2deg(scale))})
+    return measured(max(residuals, default=np.inf), panels=rows)
 
 
 FIGURE = paper_figure("fig09", panels=panels, join=join, draw=draw, measure=measure)

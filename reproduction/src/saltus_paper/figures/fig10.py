@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 from saltus.flow import find_recurrence
-from saltus.plots import DOUBLE_COLUMN, draw_beside, highest, new_figure, response_legend, styled
+from saltus.plots import DOUBLE_COLUMN, highest, new_figure, response_legend, styled
 from saltus_paper.claims.claim import Measured
 from saltus_paper.figure_data import dataset, joined, with_groups
 from saltus_paper.figures.fig09 import draw_panel
 from saltus_paper.figures.figure import paper_figure
 from saltus_paper.figures.harmonic_loads import on_ground
 from saltus_paper.figures.response_panels import spectrum
+from saltus_paper.figures.zooms import draw_beside
 from saltus_paper.measures import chaos_measures, response_measures
 from saltus_paper.measures.spectrum_features import main_branch
 from saltus_paper.measures.validity_measures import validity

@@ -11,7 +11,6 @@ from saltus import simulate
 from saltus.plots import (
     DOUBLE_COLUMN,
     FAINT,
-    draw_beside,
     draw_response,
     highest,
     lowest,
@@ -29,6 +28,7 @@ from saltus_paper.figures.figure import paper_figure
 from saltus_paper.figures.harmonic_loads import BETA0, DAMPING, SWING, VERTICAL, on_ground, under_both, under_force
 from saltus_paper.figures.load_diagrams import LEAST, frame, undeformed
 from saltus_paper.figures.response_panels import diagram
+from saltus_paper.figures.zooms import draw_beside
 from saltus_paper.measures.response_measures import border_of_rest, both_diagram
 from saltus_paper.measures.validity_measures import validity
 

@@ -11,7 +11,6 @@ import numpy as np
 from saltus import simulate_many
 from saltus.plots import (
     DOUBLE_COLUMN,
-    draw_beside,
     draw_critical,
     draw_limits,
     draw_response,
@@ -28,6 +27,7 @@ from saltus_paper.figures.figure import PaperFigure, paper_figure
 from saltus_paper.figures.harmonic_loads import AMPLITUDE, under_force
 from saltus_paper.figures.knots_and_jumps import birth
 from saltus_paper.figures.response_panels import diagram
+from saltus_paper.figures.zooms import draw_beside
 from saltus_paper.measures import response_measures
 from saltus_paper.measures.validity_measures import validity
 from saltus_paper.panel_work import Panels

@@ -16,7 +16,6 @@ import numpy as np
 from saltus import System, branches_of
 from saltus.plots import smooth_lines
 from saltus_paper.claims.claim import Measured, measured
-from saltus_paper.figures.harmonic_loads import BETA0, VERTICAL
 from saltus_paper.measures.spectrum_features import (
     PROMINENT,
     amplitudes_at,
@@ -83,7 +82,6 @@ def confirmed(spectra: Iterable[Any]) -> Measured:
 def force_spectra(panels: Panels) -> dict[str, Measured]:
     """Fig. 9, over the amplitudes of the force."""
     return {
-        "fig09-static": _static_unit(panels),
         "fig09-knots-appear": _knots_appear(panels),
         "fig09-knots": _knots_differ(panels),
         "fig09-superharmonic": _superharmonics(panels),
@@ -91,19 +89,6 @@ def force_spectra(panels: Panels) -> dict[str, Measured]:
         "fig09-jumps": _jumps(panels),
         "fig09-confirmed": confirmed(panels.values()),
     }
-
-
-def _static_unit(panels: Panels) -> Measured:
-    """The moment (`gov_eqn_theta_long`, k = 1) at theta_st, the `scale` of the spectra, where it first rises through 0."""
-    beta0, residuals, rows = np.deg2rad(BETA0), [], []
-    for load, tree in panels.items():
-        scale = float(tree.attrs["scale"])
-        theta = scale * np.append(np.linspace(0.0, 1.0 - 1e-6, 2000)[1:], (1.0, 1.0 + 1e-6))
-        moment = theta - load * np.sin(beta0 + theta) - VERTICAL * np.cos(beta0 + theta)
-        first = bool((moment[:-2] < 0.0).all()) and moment[-1] > 0.0
-        residuals.append(abs(float(moment[-2])) if first else np.inf)
-        rows.append({"load": load, "angle": float(np.rad2deg(scale))})
-    return measured(max(residuals, default=np.inf), panels=rows)
 
 
 def _knots_appear(panels: Panels) -> Measured:

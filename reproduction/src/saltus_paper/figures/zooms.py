@@ -1,0 +1,81 @@
+"""A part of a spectrum or a diagram drawn larger: as an inset where there is room, or in axes of its own beside it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from saltus import branches_of
+from saltus.plots import INK, draw_response, smooth_lines
+
+PLACES = 24  # the number of places along each side of the axes that are tried for an inset
+MARGIN = 0.05  # the ticks of an inset take this share of the axes
+WEIGHT = 0.65  # lines that are drawn larger have this share of their width, as they lie closer together
+
+
+def draw_zoom(
+    ax: Any,
+    spectrum: Any,
+    size: tuple[float, float],
+    window: tuple[float, float, float, float],
+    quantity: str = "amplitude",
+    scale: float = 1.0,
+) -> Any:
+    """An inset of a `size` (shares of the axes), placed where there is room, with the part `window` (x from, to, y from, to)."""
+    inset = ax.inset_axes(free_place(ax, spectrum, size, quantity, scale))
+    inset.set_xlim(window[:2])
+    inset.set_ylim(window[2:])
+    inset.tick_params(labelsize=6, length=2, pad=1.5)
+    inset.locator_params(nbins=3)
+    draw_response(inset, spectrum, quantity, scale, WEIGHT)
+    box = ax.indicate_inset_zoom(inset, edgecolor=INK, linewidth=0.4, alpha=1.0)
+    for connector in box.connectors:
+        connector.set_visible(False)  # they would cross the curves
+    return inset
+
+
+def draw_beside(
+    ax: Any,
+    main: Any,
+    spectrum: Any,
+    window: tuple[float, float, float, float],
+    quantity: str = "amplitude",
+    scale: float = 1.0,
+) -> None:
+    """In the axes `ax` the part `window` (x from, to, y from, to) of a diagram, framed in its axes `main`."""
+    ax.set_xlim(window[:2])
+    ax.set_ylim(window[2:])
+    ax.locator_params(axis="x", nbins=4)
+    draw_response(ax, spectrum, quantity, scale, WEIGHT)
+    box = main.indicate_inset(
+        bounds=(window[0], window[2], window[1] - window[0], window[3] - window[2]), edgecolor=INK, alpha=1.0
+    )
+    box.set_linewidth(0.5)
+
+
+def free_place(
+    ax: Any, spectrum: Any, size: tuple[float, float], quantity: str = "amplitude", scale: float = 1.0
+) -> tuple[float, float, float, float]:
+    """Where in the axes an inset of a size (shares of the axes) covers least of the branches and lines."""
+    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    marks = [np.empty((0, 2))]
+    for _, branch in branches_of(spectrum):
+        for line in smooth_lines(branch, quantity):
+            marks.append((line.places / np.array([1.0, scale]) - np.array([left, low])) / np.array([right - left, high - low]))
+    points = np.concatenate(marks)
+    margin = MARGIN
+    lines = [(line.get_ydata()[0] - low) / (high - low) for line in ax.get_lines() if len(set(line.get_ydata())) == 1]
+    table = spectrum["bands"]
+    bands = (np.stack([table["low"].values, table["high"].values], axis=1) - left) / (right - left)
+    best, least = (0.1, 0.1), np.inf
+    for y in np.linspace(0.07, 0.96 - size[1], PLACES):
+        for x in np.linspace(0.07, 0.98 - size[0], PLACES):
+            inside = (np.abs(points - np.array([x + size[0] / 2, y + size[1] / 2])) < np.array(size) / 2 + margin).all(axis=1)
+            crossed = sum(y - margin < line < y + size[1] + margin for line in lines)
+            hidden = int(((bands[:, 0] < x + size[0]) & (bands[:, 1] > x)).sum())
+            # It is better to cover a line or a band than a branch, and better to be high than low.
+            cost = inside.sum() + 0.5 * (crossed + hidden) - 1e-3 * y
+            if cost < least:
+                best, least = (x, y), cost
+    return (*best, *size)
