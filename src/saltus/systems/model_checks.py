@@ -62,9 +62,9 @@ def _check_class(kind: type[Model]) -> None:
             raise ParameterError(f"{kind.__name__} must define force(t, q, velocity, load)", "model")
     elif kind.acceleration is Model.acceleration:
         raise ParameterError(f"{kind.__name__} must define acceleration(t, q, velocity, side, load)", "model")
-    for base in (OneContactModel, ContactModel):
-        for name, function in {**vars(Model), **vars(base)}.items():
-            if isinstance(function, FunctionType) and not name.startswith("_") and issubclass(kind, base):
+    for base in (each for each in (Model, OneContactModel, ContactModel) if issubclass(kind, each)):
+        for name, function in vars(base).items():
+            if isinstance(function, FunctionType) and not name.startswith("_"):
                 _check_arguments(kind, name, function)
 
 

@@ -1,0 +1,159 @@
+"""The classes of models: what their base class says of them, and what is refused when a system is made of one."""
+
+import math
+
+import numpy as np
+import pytest
+
+import saltus
+from saltus import Contact, ContactModel, Friction, Model, OneContactModel, ParameterError, System
+from saltus.systems import MODELS
+
+
+def fall(self, t, q, velocity, side, load):
+    return -1.0 + 0.0 * q
+
+
+def pulled(self, t, q, velocity, load):
+    return -1.0 + 0.0 * q
+
+
+def bounce(self, t, velocity, side, load, impact):
+    return side, -impact.velocity_after(self, t, velocity, side, side, load)
+
+
+def made(base, **parts):
+    """A model of one coordinate x with these parts."""
+    return type("Own", (base,), {"coordinates": ("x",), **parts})()
+
+
+FLOOR = (Contact(name="floor", coordinate="x"),)
+
+
+@pytest.mark.parametrize(
+    ("model", "sentence"),
+    [
+        (made(Model), "Own must define acceleration"),
+        (made(OneContactModel), "Own must define acceleration"),
+        (made(ContactModel, contacts=FLOOR), "Own must define force"),
+        (
+            made(Model, acceleration=fall, sides=(1, -1)),
+            "sides, so its base class must be saltus.OneContactModel, not Model",
+        ),
+        (
+            made(Model, acceleration=fall, gap=lambda self, x, side: x),
+            "gap, so its base class must be saltus.OneContactModel",
+        ),
+        (
+            made(OneContactModel, acceleration=fall, contacts=FLOOR),
+            "contacts, so its base class must be saltus.ContactModel",
+        ),
+        (made(Model, force=pulled), "defines force, so its base class must be saltus.ContactModel"),
+        (made(ContactModel, force=pulled, sides=(1,)), "defines sides, so its base class must be saltus.OneContactModel"),
+        (
+            made(OneContactModel, acceleration=fall, sides=(1, -1), coordinates=("x", "y")),
+            "coordinates x, y, which must be one",
+        ),
+        (made(OneContactModel, acceleration=fall, sides=(1,)), "define reset"),
+        (made(OneContactModel, acceleration=fall, sides=(-1,)), r"sides must be \(1, -1\)"),
+        (made(OneContactModel, acceleration=fall, contact=1.0), "gap must be 0 at Own.contact = 1, got 1 on side 1"),
+        (made(OneContactModel, acceleration=fall, reset=bounce, sides=(1,), gap=lambda self, x, side: 1.0), "gap must depend"),
+        (made(OneContactModel, acceleration=fall, reset=lambda self, t, v, side, load, impact: (side, v)), "beyond the contact"),
+        (made(Model, acceleration=lambda self, t, x, velocity, load: -x), "acceleration must take the arguments self, t"),
+        (made(Model, acceleration=lambda self, t, x, v, side, load: (x, v)), r"acceleration must return 1 value\(s\)"),
+        (made(Model, acceleration=lambda self, t, x, v, side, load: -self.stiffness * x), "fails: AttributeError"),
+        (made(Model, acceleration=lambda self, t, x, v, side, load: -undefined * x), "fails: NameError"),  # noqa: F821
+        (made(ContactModel, force=pulled, contacts=FLOOR + FLOOR), "must have names of their own, got floor, floor"),
+        (made(ContactModel, force=pulled, contacts=(Contact(name="a", coordinate="y"),)), "holds 'y', but Own has x"),
+        (
+            made(ContactModel, force=pulled, contacts=FLOOR, frictions=(Friction(name="f", coordinate="x", kinetic=0.1),)),
+            "and something else hold x",
+        ),
+    ],
+)
+def test_a_model_that_cannot_work_is_refused_when_a_system_is_made_of_it(model, sentence):
+    with pytest.raises(ParameterError, match=sentence):
+        System(model=model)
+
+
+def test_a_misspelt_channel_is_refused_when_a_system_is_made():
+    model = made(Model, channels=("force",), acceleration=lambda self, t, x, v, side, load: load.forse(t) - x)
+    with pytest.raises(saltus.TraceError, match=r"reads load\.forse, not one of its channels; did you mean 'force'"):
+        System(model=model)
+
+
+def test_what_a_law_needs_of_a_model_is_refused_when_a_system_is_made():
+    with pytest.raises(ParameterError, match="WallOscillator defines no inelastic_factor"):
+        System(model=saltus.WallOscillator(), impact=saltus.InelasticImpact())
+    with pytest.raises(ParameterError, match=r"passes its contact and does not bounce there, so that impact\.e must be 0"):
+        System(model=saltus.RockingBlock(alpha=0.2), impact=saltus.NewtonImpact(e=0.5))
+    with pytest.raises(ParameterError, match=r"impact.e must have 1 value for a WallOscillator, got 2"):
+        System(model=saltus.WallOscillator(), impact=saltus.NewtonImpact(e=(0.5, 0.4)))
+
+
+@pytest.mark.parametrize("e", [0.5, (0.5,)])
+def test_newtons_law_at_a_wall_is_restitution(e):
+    """A ball falls from 2 under the acceleration 1 and loses half of its speed: t = 2, then flights of 2 v with each speed v."""
+    ball = System(
+        model=saltus.WallOscillator(stiffness=0.0, wall=0.0), load=saltus.Load(force=1.0), impact=saltus.NewtonImpact(e=e)
+    )
+    times = saltus.simulate(ball, x=-2.0, duration=5.6).impacts.time
+    assert times == pytest.approx([2.0, 4.0, 5.0, 5.5], abs=1e-13)
+
+
+def test_newtons_transfer_at_a_contact_that_is_passed_is_a_reduction_of_the_velocity():
+    block = System(model=saltus.RockingBlock(alpha=0.2), impact=saltus.NewtonImpact(transfer=0.9))
+    same = block.with_(impact=saltus.VelocityReduction(0.9))
+    one, other = (saltus.simulate(system, theta=0.1, duration=8.0) for system in (block, same))
+    assert len(one.impacts) > 2
+    assert (one.theta, one.velocity) == (other.theta, other.velocity)
+
+
+ANSWERS = {  # holds_coordinates, has_one_contact, names_its_contacts, has_state_plane, every_side
+    "Metainterface": (False, True, False, True, (1, -1)),
+    "RockingBlock": (False, True, False, True, (1, -1)),
+    "WallOscillator": (False, True, False, True, (1,)),
+    "TwoStops": (True, False, True, False, (1,)),
+    "BeltOscillator": (True, False, False, False, (1,)),
+    "TwoLayer": (True, False, True, False, (1,)),
+    "ImpactPair": (True, False, True, False, (1,)),
+    "FourCells": (True, False, True, False, (1,)),
+}
+
+
+@pytest.mark.parametrize("name", ANSWERS)
+def test_a_model_answers_what_its_callers_want_to_know(name):
+    kind = MODELS[name]
+    model = kind(**{key: 1.4 for key in ("beta0", "alpha") if key in kind.__dataclass_fields__})
+    found = (model.holds_coordinates, model.has_one_contact, model.names_its_contacts, model.has_state_plane, model.every_side)
+    assert found == ANSWERS[name]
+    assert isinstance(model, OneContactModel) is model.has_one_contact
+    assert isinstance(model, ContactModel) is model.holds_coordinates
+    assert set(model.margin_kinds) <= set(model.margin_names(saltus.Load()))
+
+
+def test_smoothing_takes_the_contact_away():
+    model = saltus.Metainterface(beta0=1.4, smoothing=100.0)
+    assert (model.has_one_contact, model.every_side, model.has_state_plane) == (False, (1,), True)
+
+
+def test_a_coordinate_reaches_what_its_contacts_let_it_reach():
+    at = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
+    assert saltus.WallOscillator(wall=1.0).reaches("x", at).tolist() == [True, True, True, True, False]
+    assert saltus.Metainterface(beta0=1.4).reaches("theta", at).all()
+    assert saltus.TwoStops().reaches("x", at).tolist() == [False, True, True, True, False]
+    assert saltus.ImpactPair(clearance=1.0).reaches("z", at).all()
+    assert saltus.TwoLayer(beta0=1.4).reaches("theta_2", at).tolist() == [True, True, True, False, False]
+    assert saltus.BeltOscillator().reaches("x", at).all()
+
+
+def test_the_direction_into_a_mode_is_that_in_which_the_gap_opens():
+    assert saltus.WallOscillator(wall=3.0).inward(1) == -1.0
+    assert [saltus.RockingBlock(alpha=0.2).inward(side) for side in (1, -1)] == [1.0, -1.0]
+
+
+def test_energy_cannot_be_restituted_to_more_than_there_was():
+    assert saltus.EnergyRestitution(r=1.0).r == 1.0
+    for r in (1.1, 0.0, math.nan):
+        with pytest.raises(ParameterError, match="r must lie in"):
+            saltus.EnergyRestitution(r=r)
