@@ -1,4 +1,3 @@
-from .belt_oscillator import BeltOscillator
 from .cell_chain import CellChain, FourCells, ThreeCells, TwoCells
 from .cell_layout import CellLayout
 from .contact import Contact, Friction
@@ -20,12 +19,11 @@ from .impact_laws import (
     energy_gain,
     energy_gains,
 )
-from .impact_pair import ImpactPair
 from .load import Channel, DeclaredLoad, Load
 from .metainterface import Metainterface
 from .mirror import contact_images, image_of
-from .model import MarginKind, Model
-from .one_contact_model import OneContactModel
+from .model import MarginKind, Model, OneContactModel
+from .oscillators import BeltOscillator, ImpactPair, TwoStops, WallOscillator
 from .parameter_tables import (
     broadcast_arrays,
     check_along,
@@ -36,8 +34,7 @@ from .parameter_tables import (
     parameter_table,
 )
 from .parameters import children, is_number, numbers, substitute
-from .pulse import Pulse
-from .pulses import Chirp, HalfSine, MavroeidisPapageorgiou, OneCosine, OneSine, Ramp, Ricker
+from .pulses import Chirp, HalfSine, MavroeidisPapageorgiou, OneCosine, OneSine, Pulse, Ramp, Ricker
 from .registry import IMPACTS, MODELS, register
 from .reversed import reversed_system
 from .rocking_block import RockingBlock
@@ -47,8 +44,11 @@ from .si_units import PhysicalCell
 from .signals import Constant, Harmonic, Record, Signal, Sum
 from .start_state import arguments_of, read_start, read_starts, state_of
 from .states import (
+    Box,
+    Window,
     before_impacts,
     check_reached,
+    check_window,
     even_steps,
     held_by_contacts,
     initial_states,
@@ -60,10 +60,7 @@ from .states import (
 )
 from .system import System, check_system
 from .two_layer import TwoLayer
-from .two_stops import TwoStops
 from .unit_cell import UnitCell
-from .wall_oscillator import WallOscillator
-from .window import Box, Window, check_window
 
 __all__ = [
     "IMPACTS",

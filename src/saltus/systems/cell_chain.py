@@ -13,8 +13,8 @@ import numpy as np
 from saltus.checks import settle_numbers
 from saltus.systems.contact import Contact
 from saltus.systems.contact_model import ContactModel
-from saltus.systems.layered_cell import LayeredCell
 from saltus.systems.load import Load
+from saltus.systems.metainterface import LayeredCell
 from saltus.systems.model import MarginKind
 from saltus.systems.two_layer import TwoLayer
 

@@ -13,8 +13,7 @@ from saltus.public_functions import answered
 from saltus.systems.contact import Contact
 from saltus.systems.contact_model import ContactModel
 from saltus.systems.load import Load
-from saltus.systems.model import Model
-from saltus.systems.one_contact_model import OneContactModel
+from saltus.systems.model import Model, OneContactModel
 
 
 class ImpactLaw:

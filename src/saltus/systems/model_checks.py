@@ -13,8 +13,7 @@ from saltus.errors import ParameterError, SaltusError, shown
 from saltus.systems.contact_model import ContactModel, check_contact_model
 from saltus.systems.impact_laws import ImpactLaw
 from saltus.systems.load import DeclaredLoad, Load
-from saltus.systems.model import Model
-from saltus.systems.one_contact_model import OneContactModel, check_one_contact
+from saltus.systems.model import Model, OneContactModel, check_one_contact
 
 # The parts of the contracts of the two siblings: a class that defines one of them and is of neither has the wrong base.
 OWN_PARTS = {

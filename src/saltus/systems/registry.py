@@ -5,19 +5,14 @@ from __future__ import annotations
 from typing import Any, TypeVar
 
 from saltus.errors import ParameterError, near, shown
-from saltus.systems.belt_oscillator import BeltOscillator
 from saltus.systems.cell_chain import FourCells, ThreeCells, TwoCells
 from saltus.systems.impact_laws import EnergyRestitution, ImpactLaw, InelasticImpact, NewtonImpact, VelocityReduction
-from saltus.systems.impact_pair import ImpactPair
 from saltus.systems.metainterface import Metainterface
-from saltus.systems.model import Model
-from saltus.systems.one_contact_model import OneContactModel, check_one_contact
-from saltus.systems.pulse import Pulse
-from saltus.systems.pulses import Chirp, HalfSine, MavroeidisPapageorgiou, OneCosine, OneSine, Ramp, Ricker
+from saltus.systems.model import Model, OneContactModel, check_one_contact
+from saltus.systems.oscillators import BeltOscillator, ImpactPair, TwoStops, WallOscillator
+from saltus.systems.pulses import Chirp, HalfSine, MavroeidisPapageorgiou, OneCosine, OneSine, Pulse, Ramp, Ricker
 from saltus.systems.rocking_block import RockingBlock
 from saltus.systems.two_layer import TwoLayer
-from saltus.systems.two_stops import TwoStops
-from saltus.systems.wall_oscillator import WallOscillator
 
 MODELS: dict[str, type[Model]] = {
     "Metainterface": Metainterface,

@@ -10,8 +10,7 @@ import numpy as np
 
 from saltus.checks import RADIANS, settle_numbers
 from saltus.systems.load import Load, reversed_load
-from saltus.systems.model import MarginKind
-from saltus.systems.one_contact_model import OneContactModel
+from saltus.systems.model import MarginKind, OneContactModel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

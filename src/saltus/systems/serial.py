@@ -8,7 +8,7 @@ from typing import Any
 
 from saltus.errors import ParameterError, near, shown
 from saltus.systems.load import Load
-from saltus.systems.pulse import Pulse
+from saltus.systems.pulses import Pulse
 from saltus.systems.signals import Constant, Harmonic, Record, Signal, Sum, as_signal
 
 

@@ -12,7 +12,7 @@ from saltus.checks import check_number, settle_numbers
 from saltus.errors import ParameterError
 from saltus.systems.load import Load
 from saltus.systems.metainterface import Metainterface
-from saltus.systems.pulse import Pulse, in_other_units
+from saltus.systems.pulses import Pulse, in_other_units
 from saltus.systems.signals import Record, Signal, Sum, scaled
 from saltus.systems.two_layer import TwoLayer
 

@@ -14,9 +14,8 @@ from saltus.systems.contact_model import ContactModel
 from saltus.systems.impact_laws import ImpactLaw, VelocityReduction
 from saltus.systems.load import Load
 from saltus.systems.mirror import check_mirror, contact_images
-from saltus.systems.model import Model
+from saltus.systems.model import Model, OneContactModel
 from saltus.systems.model_checks import check_contact, check_works
-from saltus.systems.one_contact_model import OneContactModel
 from saltus.systems.parameters import children, numbers, replace
 from saltus.systems.serial import from_dict, to_dict
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from saltus.systems.contact import Contact
 from saltus.systems.contact_model import ContactModel, reactions
-from saltus.systems.layered_cell import LayeredCell
 from saltus.systems.load import Load, reversed_load
+from saltus.systems.metainterface import LayeredCell
 from saltus.systems.model import MarginKind
 from saltus.systems.signals import vanishes
 

@@ -1,0 +1,259 @@
+"""Oscillators on a spring: at a wall, between two stops, as an impact pair, and on a moving belt."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from saltus.checks import settle_numbers
+from saltus.errors import ParameterError
+from saltus.systems.contact import Contact, Friction
+from saltus.systems.contact_model import ContactModel
+from saltus.systems.load import Load, reversed_load
+from saltus.systems.model import OneContactModel
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WallOscillator(OneContactModel):
+    """x'' + c x' + k x = F(tau), free while x < d; at the wall x = d the velocity turns round, v+ = -e v-.
+
+    It has one mode, which an impact at the wall ends and begins anew. It can rest at the wall while F - k d > 0.
+
+    Parameters
+    ----------
+    stiffness
+        k, at least 0.
+    damping
+        c, at least 0.
+    wall
+        d, the coordinate of the wall.
+
+    Examples
+    --------
+    >>> ball = saltus.System(model=saltus.WallOscillator(stiffness=0.0, wall=0.0), load=saltus.Load(force=1.0))
+    >>> saltus.simulate(ball, x=-2.0, duration=3.0).impacts.time  # the fall from a height of 2 under an acceleration of 1
+    array([2.])
+    """
+
+    stiffness: float = 1.0
+    damping: float = 0.0
+    wall: float = 1.0
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+
+    def __post_init__(self) -> None:
+        settle_numbers(self, "stiffness", "damping", at_least=0.0)
+        settle_numbers(self, "wall")
+
+    @property
+    def sides(self) -> tuple[int, ...]:
+        """One side, as the wall turns every motion back."""
+        return (1,)
+
+    @property
+    def contact(self) -> Any:
+        """x = d."""
+        return self.wall
+
+    def acceleration(self, t: Any, x: Any, velocity: Any, side: Any, load: Load) -> Any:
+        """x'' = F - c x' - k x."""
+        return load.force(t) - self.damping * velocity - self.stiffness * x
+
+    def gap(self, x: Any, side: Any) -> Any:
+        """d - x."""
+        return self.wall - x
+
+    def reset(self, t: Any, velocity: Any, side: Any, load: Load, impact: Any) -> tuple[Any, Any]:
+        """The same side, with the velocity turned round."""
+        return side, -impact.velocity_after(self, t, velocity, side, side, load)
+
+    def kinetic_energy(self, t: Any, x: Any, velocity: Any, side: Any, load: Load) -> Any:
+        """v^2 / 2."""
+        return velocity * velocity / 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TwoStops(ContactModel):
+    """x'' + c x' + k x = F(tau) for d_1 <= x <= d_2: contacts `left` and `right`, with an impact law such as `NewtonImpact`.
+
+    Parameters
+    ----------
+    stiffness
+        k, at least 0.
+    damping
+        c, at least 0.
+    left
+        d_1, the coordinate of the left stop.
+    right
+        d_2, the coordinate of the right stop, above d_1.
+
+    Examples
+    --------
+    >>> [contact.name for contact in saltus.TwoStops(left=-1.0, right=2.0).contacts]
+    ['left', 'right']
+    """
+
+    stiffness: float = 1.0
+    damping: float = 0.0
+    left: float = -1.0
+    right: float = 1.0
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+
+    def __post_init__(self) -> None:
+        settle_numbers(self, "stiffness", "damping", at_least=0.0)
+        settle_numbers(self, "left", "right")
+        if not self.left < self.right:
+            raise ParameterError(f"left must lie below right = {self.right:g}, got {self.left:g}", "left")
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """x >= d_1 and x <= d_2."""
+        left = Contact(name="left", coordinate="x", position=self.left)
+        return left, Contact(name="right", coordinate="x", sign=-1, position=self.right)
+
+    def force(self, t: Any, x: Any, velocity: Any, load: Load) -> Any:
+        """F - c x' - k x."""
+        return load.force(t) - self.damping * velocity - self.stiffness * x
+
+    def mirror(self, load: Load) -> Load | None:
+        """The load with the force reversed, for d_1 = -d_2; None otherwise."""
+        return reversed_load(load, "force") if self.left == -self.right else None
+
+    def kinetic_energy(self, t: Any, x: Any, velocity: Any, side: Any, load: Load) -> Any:
+        """x'^2 / 2."""
+        return velocity * velocity / 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImpactPair(ContactModel):
+    """An impact damper: a case on a spring, at z, and a mass in it at the distance x from the case's middle, |x| <= d:
+
+        z'' + c z' + k z + mu (z'' + x'') = F(tau),    mu (z'' + x'') = 0 while no wall pushes.
+
+    The coordinates are those of T = (z'^2 + mu (z' + x')^2) / 2, so that an impact at a wall acts on x alone, and the balance of
+    momentum gives the jump of z'. Contacts `left` at x = -d and `right` at x = d.
+
+    Parameters
+    ----------
+    mass_ratio
+        mu, the ratio of the mass to the case, above 0.
+    stiffness
+        k of the case, at least 0.
+    damping
+        c of the case, at least 0.
+    clearance
+        d, above 0.
+
+    Examples
+    --------
+    >>> [contact.name for contact in saltus.ImpactPair(clearance=0.5).contacts]
+    ['left', 'right']
+    """
+
+    mass_ratio: float = 0.1
+    stiffness: float = 1.0
+    damping: float = 0.0
+    clearance: float = 1.0
+
+    coordinates: ClassVar[tuple[str, ...]] = ("z", "x")
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+
+    def __post_init__(self) -> None:
+        settle_numbers(self, "mass_ratio", "clearance", above=0.0)
+        settle_numbers(self, "stiffness", "damping", at_least=0.0)
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """x >= -d and x <= d."""
+        left = Contact(name="left", coordinate="x", position=-self.clearance)
+        return left, Contact(name="right", coordinate="x", sign=-1, position=self.clearance)
+
+    def mass_matrix(self, q: Any) -> Any:
+        """[[1 + mu, mu], [mu, mu]]."""
+        return [[1.0 + self.mass_ratio, self.mass_ratio], [self.mass_ratio, self.mass_ratio]]
+
+    def force(self, t: Any, q: Any, velocity: Any, load: Load) -> tuple[Any, Any]:
+        """(F - c z' - k z, 0)."""
+        return load.force(t) - self.damping * velocity[0] - self.stiffness * q[0], 0.0 * q[1]
+
+    def mirror(self, load: Load) -> Load:
+        """The load with the force reversed."""
+        return reversed_load(load, "force")
+
+    def kinetic_energy(self, t: Any, q: Any, velocity: Any, side: Any, load: Load) -> Any:
+        """(z'^2 + mu (z' + x')^2) / 2."""
+        together = velocity[0] + velocity[1]
+        return (velocity[0] * velocity[0] + self.mass_ratio * together * together) / 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BeltOscillator(ContactModel):
+    """x'' + c x' + k x = F(tau) + f, a mass pressed with N(tau) on a belt of speed w; the friction f (named `belt`) is
+
+        f = -mu_k N sign(x' - w) while it slides,    abs(f) <= mu_s N while it sticks, x' = w.
+
+    A belt that stands still, w = 0, makes it an oscillator with Coulomb friction.
+
+    Parameters
+    ----------
+    stiffness
+        k, at least 0.
+    damping
+        c, at least 0.
+    kinetic
+        mu_k, at least 0.
+    static
+        mu_s, at least mu_k.
+    normal_force
+        N without the load's channel `normal`, above 0.
+    belt_speed
+        w, the speed of the belt.
+
+    Examples
+    --------
+    >>> motion = saltus.simulate(saltus.System(model=saltus.BeltOscillator()), x=0.0, velocity=0.1, duration=5.0)
+    >>> round(motion.events[0].time, 9), str(motion.events[0].kind)  # the spring pulls with mu_s N = 0.3 at x = 0.3
+    (3.0, 'slip')
+    """
+
+    stiffness: float = 1.0
+    damping: float = 0.0
+    kinetic: float = 0.2
+    static: float = 0.3
+    normal_force: float = 1.0
+    belt_speed: float = 0.1
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+    channels: ClassVar[tuple[str, ...]] = ("force", "normal")
+
+    def __post_init__(self) -> None:
+        settle_numbers(self, "stiffness", "damping", "kinetic", "static", at_least=0.0)
+        settle_numbers(self, "normal_force", above=0.0)
+        settle_numbers(self, "belt_speed")
+        if self.static < self.kinetic:
+            raise ParameterError(f"static must be at least kinetic = {self.kinetic:g}, got {self.static:g}", "static")
+
+    @property
+    def frictions(self) -> tuple[Friction, ...]:
+        """The friction of the belt."""
+        given = {"kinetic": self.kinetic, "static": self.static, "ground_speed": self.belt_speed}
+        return (Friction(name="belt", coordinate="x", **given),)
+
+    def normal_forces(self, t: Any, x: Any, velocity: Any, load: Load) -> tuple[Any, ...]:
+        """N plus the load's `normal`."""
+        return (self.normal_force + load.normal(t),)
+
+    def force(self, t: Any, x: Any, velocity: Any, load: Load) -> Any:
+        """F - c x' - k x."""
+        return load.force(t) - self.damping * velocity - self.stiffness * x
+
+    def mirror(self, load: Load) -> Load | None:
+        """The load with the force reversed, if the belt stands still; None otherwise."""
+        return reversed_load(load, "force") if self.belt_speed == 0.0 else None
+
+    def kinetic_energy(self, t: Any, x: Any, velocity: Any, side: Any, load: Load) -> Any:
+        """x'^2 / 2."""
+        return velocity * velocity / 2
