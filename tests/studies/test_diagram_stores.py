@@ -25,7 +25,8 @@ from saltus.provenance import identity
 from saltus.studies import response_spectrum
 from saltus.studies.diagram import diagram_work
 from saltus.studies.diagram.effort import EFFORTS, Effort
-from saltus.sweep import Memo, SweepInterrupted, memo, status, unpacked
+from saltus.sweep import Memo, SweepInterrupted, memo, status
+from saltus.sweep.memo_files import unpacked
 
 SCRIPT = Path(__file__).with_name("diagram_script.py")
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from saltus.errors import SweepError
-from saltus.sweep import Memo, MemoKind, memo, packed, unpacked
+from saltus.sweep import Memo, MemoKind, memo
+from saltus.sweep.memo_files import packed, unpacked
 
 SQUARES = MemoKind("squares", "test_memo:squares", chunk=3)
 FAILING = MemoKind("failing", "test_memo:failing", chunk=1)

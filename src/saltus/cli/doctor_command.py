@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 PERIODS = 10  # forcing periods of the trial motion: fifteen impacts, which would show a wrong root or a wrong impact law
 LARGEST_ERROR = 1e-12  # allowed in the trial motion at tol = 1e-14; rounding alone gives some 1e-15 for each impact
-MEBIBYTE = 2.0**20
 DOCUMENTED = (0.22733602, 0.31675834, 0.79736546)  # default_rng(12345).random(3) in NumPy's documentation of its generators
 
 
@@ -64,7 +63,7 @@ def _cache(wrong: list[str]) -> Block:
 
     folder = cache_directory()  # warns if another folder than the usual one is used, and why
     files = [path for path in folder.rglob("*") if path.is_file()]
-    size = sum(path.stat().st_size for path in files) / MEBIBYTE
+    size = sum(path.stat().st_size for path in files) / 2**20
     kernels = sum(path.suffix == ".py" for path in files)
     wanted = os.environ.get("SALTUS_CACHE_DIR")
     if wanted and not folder.is_relative_to(Path(wanted)):

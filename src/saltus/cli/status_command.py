@@ -12,15 +12,13 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from saltus.errors import ParameterError, printable
+from saltus.cli.summaries import MOST_NAMED
+from saltus.errors import LONGEST_NAME, ParameterError, printable
 
 if TYPE_CHECKING:
     from saltus.sweep import StoreStatus
 
 SEARCH = "diagram"  # the kind of a store whose number of parts is not known beforehand
-BAR_WIDTH = 40  # columns of the bar
-FAILURES_NAMED = 5  # the most failed chunks that are named
-LONGEST_KIND = 40  # the most characters that are shown of a store's kind
 
 
 def print_status(path: Path, verify: bool = False) -> None:
@@ -46,11 +44,11 @@ def print_status(path: Path, verify: bool = False) -> None:
         return
     found = status(path, verify=verify)
     console = Console(highlight=False)
-    kind = printable(found.kind, LONGEST_KIND)
+    kind = printable(found.kind, LONGEST_NAME)
     console.print(Text(f"{kind[:1].upper()}{kind[1:].replace('_', ' ')} ", style="bold"), end="")
     console.print(f"in {path}", markup=False, soft_wrap=True)
     if console.is_terminal and found.kind != SEARCH:
-        console.print(ProgressBar(total=found.total, completed=found.done, width=BAR_WIDTH), "", sep="\n")
+        console.print(ProgressBar(total=found.total, completed=found.done), "", sep="\n")
     table = Table(box=None, show_header=False, pad_edge=False)
     table.add_column(style="dim", no_wrap=True)
     table.add_column(overflow="fold")
@@ -108,10 +106,10 @@ def rows(found: StoreStatus) -> Iterator[tuple[str, str]]:
     yield "last written", moment(found.updated) if found.updated else "nothing yet"
     if found.failures:
         yield "failed", str(found.failed)
-    for failure in found.failures[:FAILURES_NAMED]:
+    for failure in found.failures[:MOST_NAMED]:
         yield "", str(failure)
-    if found.failed > FAILURES_NAMED:
-        yield "", f"and {found.failed - FAILURES_NAMED} more"
+    if found.failed > MOST_NAMED:
+        yield "", f"and {found.failed - MOST_NAMED} more"
 
 
 def ending(found: StoreStatus) -> str:

@@ -1,5 +1,5 @@
-from .questions import Ask, Settings
+from .questions import Ask
 from .results import kind_of, load, open_result, save, to_mat
 from .study import Study, load_study
 
-__all__ = ["Ask", "Settings", "Study", "kind_of", "load", "load_study", "open_result", "save", "to_mat"]
+__all__ = ["Ask", "Study", "kind_of", "load", "load_study", "open_result", "save", "to_mat"]

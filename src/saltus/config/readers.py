@@ -20,8 +20,6 @@ from saltus.errors import ParameterError, near
 
 Keys = tuple[str, ...]
 
-LARGEST = 10_000_000  # the most bytes of a study: a larger file is something else
-
 
 @dataclass(frozen=True)
 class Source:
@@ -55,9 +53,9 @@ def read_source(path: Path) -> tuple[Source, dict[str, Any]]:
     try:
         if path.exists() and not (path.is_file() or path.is_dir()):  # reading a device or a pipe may never end
             source.refuse((), "is no file; give the path of a study in TOML")
-        if path.is_file() and path.stat().st_size > LARGEST:
+        if path.is_file() and path.stat().st_size > LIMITS.count:
             source.refuse(
-                (), f"has {path.stat().st_size} bytes; a study has at most {LARGEST}, long records have files of their own"
+                (), f"has {path.stat().st_size} bytes; a study has at most {LIMITS.count}, long records have files of their own"
             )
         text = path.read_text(encoding="utf-8-sig")
     except ParameterError:

@@ -116,6 +116,5 @@ for _class in (
     *(Solution, OrbitEvaluation, End, Evidence, Missed),
 ):
     CLASSES[_class.__name__] = _class, _fields, _class
-ENUMERATIONS: dict[str, Callable[[Any], Any]] = {
-    each.__name__: each for each in (SpecialKind, OrbitEnd, CurveEnd, OrbitMissed, CurveMissed)
-}
+_KINDS: tuple[type[Enum], ...] = (SpecialKind, OrbitEnd, CurveEnd, OrbitMissed, CurveMissed)
+ENUMERATIONS: dict[str, Callable[[Any], Any]] = {each.__name__: each for each in _KINDS}

@@ -2,7 +2,6 @@ from .chunks import Failure
 from .cluster import on_cluster
 from .execution import SweepInterrupted, check_run, run
 from .memo import Memo, MemoKind
-from .memo_files import packed, unpacked
 from .plan import Plan, Variable
 from .store import BEGIN_ANEW, check_store, open_store, opened, remove_store
 from .store_status import StoreStatus, damage, read_plan, status
@@ -24,10 +23,8 @@ __all__ = [
     "on_cluster",
     "open_store",
     "opened",
-    "packed",
     "read_plan",
     "remove_store",
     "run",
     "status",
-    "unpacked",
 ]

@@ -118,7 +118,7 @@ class Memo:
         if not chunks:
             return
         alone = kind.threaded or sum(map(len, chunks)) == 1 or self.spent < self.patience
-        batches, queue = Batches(kind.function, self.common, chunks), deque((i,) for i in range(len(chunks)))
+        batches, queue = Batches(kind.function, self.common, chunks), deque[Index]((i,) for i in range(len(chunks)))
         begun, failed, done = time.monotonic(), set[Index](), 0
         try:
             with closing(outcomes(batches, queue, None if alone else self.workers, self.scheduler)) as found:

@@ -16,7 +16,6 @@ import numpy as np
 from saltus.errors import ParameterError, near, shown
 from saltus.sweep.chunks import MOST_CHUNKS, NAME, ChunkGrid, Index, resolve
 
-QUOTED = 60  # the most characters of a value that a message shows
 DIGEST = re.compile(r"[0-9a-f]{20,}")  # messages say that a digest has changed, but do not show it
 RESERVED = ("zarr.json", "plan")
 WRITER = "saltus_version"  # names the version that wrote a store; whether results are the same is told by `result_version`
@@ -320,15 +319,15 @@ def differences(there: Any, here: Any, place: str = "") -> Iterator[str]:
         for key in dict.fromkeys([*there, *here]):
             below = f"{place}.{key}" if place else key
             if key not in here:
-                yield f"{below} is {_short(there[key])} there and not given here"
+                yield f"{below} is {shown(there[key])} there and not given here"
             elif key not in there:
-                yield f"{below} is {_short(here[key])} here and not given there"
+                yield f"{below} is {shown(here[key])} here and not given there"
             else:
                 yield from differences(there[key], here[key], below)
     elif there != here and _is_digest(there) and _is_digest(here):
         yield f"{place} has changed"
     elif there != here or isinstance(there, bool) != isinstance(here, bool):
-        yield f"{place} is {_short(there)} there and {_short(here)} here"
+        yield f"{place} is {shown(there)} there and {shown(here)} here"
 
 
 def _is_digest(value: Any) -> bool:
@@ -342,8 +341,3 @@ def _parsed(value: Any) -> Any:
         except ValueError:
             return value
     return value
-
-
-def _short(value: Any) -> str:
-    quoted = repr(value)
-    return quoted if len(quoted) <= QUOTED else quoted[: QUOTED - 3] + "..."

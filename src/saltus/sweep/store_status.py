@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from saltus.checks import LIMITS
 from saltus.errors import ParameterError
 from saltus.files import parsed_json
 from saltus.public_functions import answered
@@ -20,7 +21,6 @@ from saltus.sweep.chunks import ChunkGrid, Failure, Index
 from saltus.sweep.memo_files import memo_status
 
 CODECS = {"bytes", "zstd", "crc32c"}  # as a store is made
-BYTES_AT_ONCE = 256e6  # bytes of chunks that are read together, which is faster than reading them one by one
 NAMED = 3  # damaged files that a sentence names
 
 
@@ -253,7 +253,7 @@ def damaged_chunks(path: Path, arrays: Any, chunks: ChunkGrid, extra: dict[str, 
             if not there:
                 continue
             rows = chunks.slices(there[0])[0]
-            if row.all() and _row_size(array, rows) < BYTES_AT_ONCE and _can_be_read(array, (rows,)):
+            if row.all() and _row_size(array, rows) < LIMITS.any_machine and _can_be_read(array, (rows,)):
                 continue
             yield from ((name, index) for index in there if not _can_be_read(array, chunks.slices(index)))
 
