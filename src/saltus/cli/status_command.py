@@ -12,7 +12,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from saltus.cli.summaries import MOST_NAMED
+from saltus.cli.summaries import MOST_LISTED
 from saltus.errors import LONGEST_NAME, ParameterError, printable
 
 if TYPE_CHECKING:
@@ -106,10 +106,10 @@ def rows(found: StoreStatus) -> Iterator[tuple[str, str]]:
     yield "last written", moment(found.updated) if found.updated else "nothing yet"
     if found.failures:
         yield "failed", str(found.failed)
-    for failure in found.failures[:MOST_NAMED]:
+    for failure in found.failures[:MOST_LISTED]:
         yield "", str(failure)
-    if found.failed > MOST_NAMED:
-        yield "", f"and {found.failed - MOST_NAMED} more"
+    if found.failed > MOST_LISTED:
+        yield "", f"and {found.failed - MOST_LISTED} more"
 
 
 def ending(found: StoreStatus) -> str:

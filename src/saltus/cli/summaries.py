@@ -71,7 +71,7 @@ def _validity(motion: Motion) -> list[tuple[str, str]]:
     return rows + [(f"impacts at {name}", motion.validity.gain(name)) for name in motion.validity.gains]
 
 
-MOST_NAMED = 8  # the most special points, or failed chunks, that are named; further ones are only counted
+MOST_LISTED = 8  # the most special points, or failed chunks, that are named; further ones are only counted
 
 
 def summarise(kind: str, data: Any) -> Iterator[str]:
@@ -125,9 +125,9 @@ def _diagram(tree: Any) -> Iterator[str]:
     for number, branch in branches_of(tree):
         special = (branch[name].values for name in ("kind", "special_parameter"))
         kinds = [f"{kind} {value:.6g}" for kind, value in zip(*special, strict=True)]
-        more = f" and {len(kinds) - MOST_NAMED} more" if len(kinds) > MOST_NAMED else ""
+        more = f" and {len(kinds) - MOST_LISTED} more" if len(kinds) > MOST_LISTED else ""
         period = int(branch["period"].max())  # at an end at its own image, a branch has the orbit of half the period
-        x, listed = branch["parameter"].values, ", ".join(kinds[:MOST_NAMED]) or "no special points"
+        x, listed = branch["parameter"].values, ", ".join(kinds[:MOST_LISTED]) or "no special points"
         yield (
             f"branch {number}: period {period}, {path} {x.min():.6g} to {x.max():.6g}, "
             f"{int(branch['stable'].sum())} of {x.size} points stable; {listed}{more}"
