@@ -13,7 +13,8 @@ import xarray
 
 from saltus.attractors import basins_of_attraction
 from saltus.config import load_study
-from saltus.plots import draw_stability_chart, figure_of
+from saltus.plots import figure_of
+from saltus.plots.chart import draw_stability_chart
 from saltus.studies import stability_chart
 from saltus.sweep import open_store, status
 from saltus.sweep.cluster import ClusterSettings

@@ -10,7 +10,8 @@ import saltus
 from saltus import theory
 from saltus.errors import MotionError, ParameterError
 from saltus.orbits import backbone, free_orbit
-from saltus.plots import draw_backbone, figure_of
+from saltus.plots import figure_of
+from saltus.plots.curves import draw_backbone
 from saltus.systems import OneContactModel, System
 
 

@@ -23,6 +23,7 @@ from saltus import plots
 from saltus.errors import ParameterError
 from saltus.files import write_dataset
 from saltus.plots.any_result import DRAWINGS, _by_content
+from saltus.plots.curves import draw_special_curve
 from saltus.result import Result
 
 PANELS = ("saltus.simulate", "saltus.find_orbit", "saltus.free_orbit", "saltus.doubling_cascade", "saltus.chaotic_bands")
@@ -207,7 +208,7 @@ def test_a_free_orbit_and_a_chart_keep_what_they_are():
 
 
 def test_every_function_that_draws_a_whole_result_takes_axes():
-    whole = {*plots.DRAWINGS.values(), plots.draw_special_curve}
+    whole = {*plots.DRAWINGS.values(), draw_special_curve}
     for draw in whole:
         assert "ax" in inspect.signature(draw).parameters, draw
 

@@ -8,7 +8,8 @@ from saltus.cli.summaries import summarise
 from saltus.config import load_study
 from saltus.errors import ParameterError
 from saltus.orbits import SpecialKind
-from saltus.plots import draw_sweep, figure_of
+from saltus.plots import figure_of
+from saltus.plots.ensembles import draw_sweep
 
 DAMPING, FORCE = 0.1, 0.2
 

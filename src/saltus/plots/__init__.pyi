@@ -1,7 +1,7 @@
 from .any_result import DRAWINGS, plot
 from .basins import draw_basins
 from .branch_cuts import BranchLine, ModelValidity, border_curves, branch_lines, smooth_lines
-from .chart import chart_legend, data_is_tree, draw_chart, draw_closed_form, draw_lines, draw_stability_chart
+from .chart import chart_legend, data_is_tree, draw_chart, draw_closed_form, draw_lines
 from .conventions import (
     DASHES,
     DOUBLE_COLUMN,
@@ -20,9 +20,8 @@ from .conventions import (
     style,
     styled,
 )
-from .curves import draw_backbone, draw_branch, draw_special_curve
-from .diagram import POINTS, draw_diagram
-from .ensembles import draw_sweep
+from .curves import draw_branch
+from .diagram import POINTS
 from .marks import arrow_along, fixed_points, limit_lines
 from .motion import draw_motion
 from .plane import draw_arrows
@@ -61,7 +60,6 @@ __all__ = [
     "chart_legend",
     "data_is_tree",
     "draw_arrows",
-    "draw_backbone",
     "draw_bands",
     "draw_basins",
     "draw_branch",
@@ -70,16 +68,12 @@ __all__ = [
     "draw_chart",
     "draw_closed_form",
     "draw_critical",
-    "draw_diagram",
     "draw_frames",
     "draw_limits",
     "draw_lines",
     "draw_motion",
     "draw_response",
     "draw_special",
-    "draw_special_curve",
-    "draw_stability_chart",
-    "draw_sweep",
     "figure_of",
     "fixed_points",
     "highest",

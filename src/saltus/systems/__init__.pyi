@@ -1,5 +1,4 @@
-from .cell_chain import CellChain, FourCells, ThreeCells, TwoCells
-from .cell_layout import CellLayout
+from .cell_chain import FourCells, ThreeCells, TwoCells
 from .contact import Contact, Friction
 from .contact_model import (
     ContactModel,
@@ -38,7 +37,7 @@ from .pulses import Chirp, HalfSine, MavroeidisPapageorgiou, OneCosine, OneSine,
 from .registry import IMPACTS, MODELS, register
 from .reversed import reversed_system
 from .rocking_block import RockingBlock
-from .scenarios import LayerState, NamedImpact, Scenario, TableRow, name_impact, other_impulse, table_1
+from .scenarios import LayerState, Scenario, name_impact, other_impulse, table_1
 from .serial import signal_class
 from .si_units import PhysicalCell
 from .signals import Constant, Harmonic, Record, Signal, Sum
@@ -67,8 +66,6 @@ __all__ = [
     "MODELS",
     "BeltOscillator",
     "Box",
-    "CellChain",
-    "CellLayout",
     "Channel",
     "Chirp",
     "Constant",
@@ -89,7 +86,6 @@ __all__ = [
     "MavroeidisPapageorgiou",
     "Metainterface",
     "Model",
-    "NamedImpact",
     "NewtonImpact",
     "OneContactModel",
     "OneCosine",
@@ -104,7 +100,6 @@ __all__ = [
     "Signal",
     "Sum",
     "System",
-    "TableRow",
     "ThreeCells",
     "TwoCells",
     "TwoLayer",
