@@ -8,9 +8,9 @@ from shared_systems import forced, walled
 
 import saltus
 from saltus import ParameterError
-from saltus.attractors import classify, excludes_tori, zero_one_test
+from saltus.attractors import Reason, classify, excludes_tori, zero_one_test
 from saltus.attractors.orbit_certificate import certify
-from saltus.flow import Ending, find_recurrence
+from saltus.flow import Ending, EventKind, find_recurrence
 from saltus.systems import state_of
 from saltus.theory import equilibria
 
@@ -47,6 +47,22 @@ def test_a_longer_period_is_counted_in_forcing_periods():
         strobes = find_recurrence(verdict.system, np.array([list(verdict.state.values())]), 3).states[0]
         np.testing.assert_allclose(strobes[-1], list(verdict.state.values()), rtol=0, atol=1e-7)
         assert np.abs(strobes[0] - strobes[-1]).max() > 1e-3
+
+
+def test_a_ball_that_comes_to_rest_now_and_then_is_no_chaos_but_of_a_long_period():
+    """A ball on a shaken table, seen from the table: each rest on it makes all motions one, so that the exponent is below 0."""
+    ball = saltus.System(
+        model=saltus.WallOscillator(stiffness=0.0, damping=0.0, wall=0.0),
+        load=saltus.Load(frequency=1.0, force=saltus.Harmonic(amplitude=3.0142857142857142, mean=1.0)),
+        impact=saltus.VelocityReduction(0.5),
+    )
+    verdict = classify(ball, x=-0.5)
+    assert verdict.kind is Ending.UNDECIDED
+    assert verdict.cause is Reason.COMING_TOGETHER
+    assert "motions beside it come together" in verdict.reason
+    assert verdict.evidence["largest_exponent"] + verdict.evidence["largest_exponent_error"] < 0.0
+    rests = saltus.simulate(ball, x=-0.5, periods=1000, dense=False).events.of(EventKind.REST)
+    assert len(rests) > 1
 
 
 def test_an_orbit_with_rest_is_periodic():

@@ -12,7 +12,7 @@ from .equations.resting import RestingOrbit
 from .finding.from_motion import find_orbit, orbit_from
 from .finding.near_returns import orbits_near_returns, solved_near
 from .finding.search import Search, search_orbits
-from .free_orbits import FreeOrbit, FreeOutcome, backbone, free_orbit
+from .free_orbits import FreeOrbit, NoFreeOrbit, backbone, free_orbit
 from .orbit import PeriodicOrbit, solve
 from .orbits_as_json import as_json, from_json
 from .signature import Signature
@@ -24,7 +24,7 @@ __all__ = [
     "Branch",
     "Cascade",
     "FreeOrbit",
-    "FreeOutcome",
+    "NoFreeOrbit",
     "OneContactEquations",
     "OrbitEnd",
     "PeriodicOrbit",

@@ -12,7 +12,7 @@ import numpy as np
 from saltus.checks import as_numbers, check_number
 from saltus.enumerations import Sentence
 from saltus.errors import MotionError, ParameterError, shown
-from saltus.flow import Motion, Stop, simulate
+from saltus.flow import Ending, Motion, Stop, simulate
 from saltus.progress import Progress, silent
 from saltus.provenance import provenance
 from saltus.public_functions import answered
@@ -40,10 +40,9 @@ class FreeOrbitSettings:
 SETTINGS = FreeOrbitSettings()
 
 
-class FreeOutcome(Sentence):
-    """What becomes of a free motion that begins at rest."""
+class NoFreeOrbit(Sentence):
+    """Why a free motion that begins at rest is no orbit."""
 
-    PERIODIC = "it comes back to where it began"
     EQUILIBRIUM = "it stays where it is"
     LOST = "it does not come back to where it began: energy is lost or gained"
     ENDED = "it is ended by a margin of the model, or cannot go on"
@@ -123,7 +122,7 @@ def free_orbit(system: System, amplitude: float) -> FreeOrbit:
     ParameterError
         The system has several coordinates, its load varies, or the amplitude is no finite number.
     MotionError
-        The motion does not come back: `FreeOutcome` says why.
+        The motion does not come back: `NoFreeOrbit` says why.
 
     Examples
     --------
@@ -134,7 +133,7 @@ def free_orbit(system: System, amplitude: float) -> FreeOrbit:
     _check(system, "free_orbit")
     check_number("amplitude", amplitude)
     found = _found(system, float(amplitude))
-    if isinstance(found, FreeOutcome):
+    if isinstance(found, NoFreeOrbit):
         name = system.model.coordinates[0]
         raise MotionError(f"no free orbit begins at rest at {name} = {amplitude:g}: {found}")
     return found
@@ -157,7 +156,7 @@ def backbone(system: System, amplitudes: Iterable[float], *, progress: Progress 
     -------
     xarray.Dataset
         A Dataset over (amplitude): `period`, `frequency` = 2 pi / period, `turning` (the other turning point), `impact_speed`
-        (the largest; nan without impacts), `defect`, and `outcome`, a word of `FreeOutcome`; nan where there is no free orbit.
+        (the largest; nan without impacts), `defect`, and `outcome`, periodic or a word of `NoFreeOrbit`; nan where there is none.
 
     Raises
     ------
@@ -192,7 +191,7 @@ def backbone(system: System, amplitudes: Iterable[float], *, progress: Progress 
     for key, (units, text) in columns.items():
         values = [getattr(orbit, key) if isinstance(orbit, FreeOrbit) else math.nan for orbit in found]
         data[key] = ("amplitude", np.array(values), {"units": units, "long_name": text})
-    words = [(FreeOutcome.PERIODIC if isinstance(orbit, FreeOrbit) else orbit).name.lower() for orbit in found]
+    words = [str(Ending.PERIODIC) if isinstance(orbit, FreeOrbit) else orbit.name.lower() for orbit in found]
     data["outcome"] = ("amplitude", np.array(words), {"long_name": "what becomes of the motion"})
     data.attrs = {"title": "free orbits computed by saltus", "kind": "backbone"}
     data.attrs |= provenance(system, tol=SETTINGS.tol, coordinate=name)
@@ -218,7 +217,7 @@ def _followed(system: System, amplitude: float, duration: float) -> Motion:
     return simulate(system, **start, duration=duration, tol=SETTINGS.tol)
 
 
-def _found(system: System, amplitude: float) -> FreeOrbit | FreeOutcome:
+def _found(system: System, amplitude: float) -> FreeOrbit | NoFreeOrbit:
     """The free orbit that begins at rest at the coordinate `amplitude`, or the reason why the motion is not periodic."""
     duration = SETTINGS.first_duration
     while duration <= SETTINGS.most_duration:
@@ -227,25 +226,25 @@ def _found(system: System, amplitude: float) -> FreeOrbit | FreeOutcome:
         if len(turns) >= 2:
             return _closed(motion, amplitude, turns[0], turns[1])
         if (motion.stop is Stop.REST and motion.rest_time == motion.start) or not _moves(motion):
-            return FreeOutcome.EQUILIBRIUM
+            return NoFreeOrbit.EQUILIBRIUM
         if motion.stop is Stop.REST:
-            return FreeOutcome.LOST
+            return NoFreeOrbit.LOST
         if motion.stop is not Stop.HORIZON:
-            return FreeOutcome.ENDED
+            return NoFreeOrbit.ENDED
         duration *= 2.0
-    return FreeOutcome.AWAY
+    return NoFreeOrbit.AWAY
 
 
 def _moves(motion: Motion) -> bool:
     return motion.dense is not None and bool(np.any(motion.dense.series[:, :, 1:]))
 
 
-def _closed(motion: Motion, amplitude: float, half: float, period: float) -> FreeOrbit | FreeOutcome:
+def _closed(motion: Motion, amplitude: float, half: float, period: float) -> FreeOrbit | NoFreeOrbit:
     """The orbit whose turning points are reached at `half` and `period`, if it is then back at its start."""
     turning, back = (float(motion.at(time)[0]) for time in (half, period))
     defect, size = abs(back - amplitude), max(abs(amplitude), abs(turning))
     if defect > SETTINGS.returned * size:
-        return FreeOutcome.LOST
+        return NoFreeOrbit.LOST
     inside = motion.impacts.time <= period
     speeds = np.abs(motion.impacts.velocity_before[inside])
     return FreeOrbit(motion.system, amplitude, turning, period, float(speeds.max()) if speeds.size else math.nan, defect)
