@@ -285,8 +285,10 @@ def _judged(case: _Case, ends: Recurrence) -> Verdict:
     if after_all is not None:
         return _after_all(after_all, answer, before, evidence)
     ending, periods = Ending(answer.ending[0]), before + round(float(later.periods[0]))
-    if ending is Ending.PERIODIC:
-        return _approaching(case, later, answer, {"periods": periods, "evidence": evidence})
+    if ending is Ending.PERIODIC or answer.reason[0] == Reason.NOT_SURE:
+        approached = _approaching(case, later, answer, {"periods": periods, "evidence": evidence})
+        if approached is not None:
+            return approached
     against = excludes_tori(case.system) if answer.reason[0] == Reason.NOT_SURE else None
     evidence |= {} if against is None else {"no_tori": against}
     reason = answer.sentence(0, case.settings, "" if against is None else "; a torus is excluded")
@@ -332,13 +334,13 @@ def _after_all(verdict: Verdict, answer: Judged, before: int, evidence: dict[str
     )
 
 
-def _approaching(case: _Case, ends: Recurrence, answer: Judged, given: dict[str, Any]) -> Verdict:
-    """The verdict on a motion that the judge calls periodic: on its orbit, if the orbit is found."""
+def _approaching(case: _Case, ends: Recurrence, answer: Judged, given: dict[str, Any]) -> Verdict | None:
+    """The verdict on a motion that is or may be periodic: on its orbit, if the orbit is found and attracts."""
     period = int(answer.period[0]) or None
     state = answer.settled.state[answer.settled.question == 0][-1] if period else ends.last[0]
     found = certify(case.clock, state, period, max_period=case.max_period)
-    if found.sound:
-        long = period is not None and period > case.max_period
-        seen = f"it repeats itself every {period} forcing periods" if long else "it approaches slowly"
-        return _on_orbit(case, ends, found, seen, **given)
-    return case.undecided(Reason(answer.reason[0]), ends, {}, reason=answer.sentence(0, case.settings), **given)
+    if not found.sound:
+        return None
+    long = period is not None and period > case.max_period
+    seen = f"it repeats itself every {period} forcing periods" if long else "it approaches slowly"
+    return _on_orbit(case, ends, found, seen, **given)

@@ -23,7 +23,9 @@ class SegmentFollower:
         self.own = int(record["own"])  # degrees of freedom
         self._columns, self._margins = int(record["columns"]), max(1, int(record["margin_count"]))
 
-    def follow(self, numbers: tuple[Any, Any], request: tuple[Any, ...], with_extremes: bool = False) -> SegmentResults | None:
+    def follow_segments(
+        self, numbers: tuple[Any, Any], request: tuple[Any, ...], with_extremes: bool = False
+    ) -> SegmentResults | None:
         """The smooth motions of a model with one contact along the segments of a `SegmentRequest`, with their extremes if asked
         for; None where a segment cannot be followed.
 

@@ -218,7 +218,7 @@ class OneContactEquations(OrbitEquations):
         parameters = self._values.copy()
         parameters[self._places] = values
         env, functions = self._run.structure.prepare(parameters, self._records)
-        followed = self._follower.follow((env, functions), segments, with_extremes)
+        followed = self._follower.follow_segments((env, functions), segments, with_extremes)
         return None if followed is None else FollowedSegments(*followed, np.sign(functions.geometry[1:]))
 
     def _segments(self, unknowns: np.ndarray, later: np.ndarray, frequency: float) -> Segments:
