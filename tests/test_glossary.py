@@ -15,11 +15,12 @@ SOURCE = Path(saltus.__file__).parent
 GLOSSARY = SOURCE.parents[1] / "docs" / "glossary.md"
 # Words of class names that mean what they mean in plain English, or in every program.
 PLAIN = """
-    advanced approach array ask backward belt box buffer case chain check common compiler computation condition conditioned confirmation
-    declared detail difference energy extreme factor failure file find four gain geometry group growth half helper inner
-    interrupted judged line linear linked linking loaded location loop mask matching natural neighbour numbered opening origin
-    oscillator outcome peak physical placement pointed raised read reading restart row run sampled searched sequence singular size
-    slow solver source spacing stretched stretching table three timed type until vibration wanted watch whole
+    advanced approach array ask backward belt box buffer case chain check common compiler computation condition conditioned
+    confirmation declared detail difference energy extreme factor failure file find four gain geometry group growth half
+    helper inner interrupted judged line linear linked linking loaded location loop mask matching natural neighbour numbered
+    opening origin oscillator outcome peak physical placement pointed raised read reading restart row run sampled searched
+    sequence singular size slow solver source spacing stretched stretching table three timed type until vibration wanted watch
+    whole
 """
 PERSONS = "lyapunov mavroeidis newton papageorgiou ricker wada"
 MEANINGS = {"follow": 3, "at": 3, "held": 3}  # the most functions of these names; the glossary says what they do
