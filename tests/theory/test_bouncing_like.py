@@ -160,8 +160,8 @@ def test_passes_a_barrier_into_the_far_well():
         (lambda: peaks(cell().with_({"model.damping": 0.1}), 0.1), "undamped"),
         (lambda: peaks(System(model=Metainterface(beta0=1.0), load=Load(frequency=1.0, vertical=Harmonic(0.1))), 0.1), "varies"),
         (lambda: reciprocal(cell(m=1.0), 0.1), "m = 0"),
-        (lambda: unloaded_period(0.0), "stiffness_ratio must lie in (0, inf)"),
-        (lambda: unloaded_peak_ratio(1.0, -1.0), "mass_ratio must lie in [0, inf)"),
+        (lambda: unloaded_period(0.0), "stiffness_ratio must"),
+        (lambda: unloaded_peak_ratio(1.0, -1.0), "mass_ratio must"),
     ],
 )
 def test_refuses_what_is_out_of_range(call, message):

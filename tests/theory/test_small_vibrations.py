@@ -180,7 +180,7 @@ def test_final_time_is_the_sum_of_all_cycles(e):
         (lambda: short_period(0.1, beta0=math.pi / 2, vertical=-0.5), "below 0"),
         (lambda: upright_period(0.1, beta0=1.5, vertical=-1.0), "other than -1"),
         (lambda: upright_period(0.5, beta0=1.5, vertical=-1.5), "saddle"),
-        (lambda: decayed_amplitude(0, theta0=0.1, e=0.8), "cycle must lie in [1, inf)"),
+        (lambda: decayed_amplitude(0, theta0=0.1, e=0.8), "cycle must"),
         (lambda: decayed_period(1, period=1.0, e=1.2), "e must"),
         (lambda: final_time(period=1.0, e=1.0), "e must"),
         (lambda: vibrations(System(model=Metainterface(beta0=BETA), load=Load(vertical=-1.2))), "lower layer does not vibrate"),
