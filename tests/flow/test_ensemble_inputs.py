@@ -13,7 +13,7 @@ from lane_cases import Duffing
 import saltus
 from saltus.errors import ParameterError, SaltusError
 from saltus.flow import share_cores, stop_names
-from saltus.flow.lanes.wanted import read_threads
+from saltus.flow.lanes.options import read_threads
 from saltus.systems import Harmonic, Load, Metainterface, Record, System, WallOscillator
 
 SYSTEM = System(model=Metainterface(beta0=1.4, damping=0.1), load=Load(frequency=1.0, horizontal=Harmonic(0.3), vertical=-0.5))

@@ -1,15 +1,17 @@
 """The roots of the lanes: exact to rounding from any first guess, with the velocity there; and the rough functions they use."""
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from numba import njit, types
+from numba import from_dtype, njit, types
 
 from saltus.flow.kernel import layout as kernel_layout
-from saltus.flow.kernel.memory_layout import HIGHEST_ORDER, LOWEST_ORDER, SERIES_LENGTH, LanePart
-from saltus.flow.lanes import lane_layout, lane_steps, meeting
-from saltus.taylor import compiled_part, lane_vectors, numba_types, private_numba
+from saltus.flow.kernel.memory_layout import HIGHEST_ORDER, LOWEST_ORDER, SERIES_LENGTH
+from saltus.flow.lanes import gap_roots, lane_steps, memory
+from saltus.flow.lanes.memory import FLAGS, ROW, SERIES, Gap
+from saltus.taylor import LanesType, compiled_part, lane_memory, lane_vectors, named_tuple, private_numba, shared_as
 from saltus.taylor.lane_vectors import (
     ALL,
     load,
@@ -27,41 +29,70 @@ from saltus.taylor.vectors import WIDTH
 
 EPS = 2.0**-52
 H = 0.7  # the step
-# Of a memory with the three series of one coordinate, and slots for what goes in and out
-PLACES = np.zeros(len(LanePart), dtype=np.int64)
-PLACES[[LanePart.POSITIONS, LanePart.VELOCITIES, LanePart.ACCELERATIONS]] = 0, SERIES_LENGTH, 2 * SERIES_LENGTH
-STEP, SIGN, TIME, SPEED, CERTAIN, SIZE = range(3 * SERIES_LENGTH, 3 * SERIES_LENGTH + 6)
-COMPILED = {"np": np, "math": math, "SERIES_LENGTH": SERIES_LENGTH} | vars(lane_vectors) | vars(private_numba) | vars(numba_types)
-for part in (kernel_layout, lane_layout, lane_steps, meeting):
+COMPILED = {"np": np, "math": math, "SERIES_LENGTH": SERIES_LENGTH}
+COMPILED |= vars(lane_vectors) | vars(private_numba) | vars(lane_memory) | {"Gap": Gap}
+for part in (kernel_layout, memory, lane_steps, gap_roots):
     exec(compiled_part(part), COMPILED)
 motion_at, only_root, guess_from_end = COMPILED["motion_at"], COMPILED["only_root"], COMPILED["guess_from_end"]
 sweep, short_flight, guess_from_start = COMPILED["sweep"], COMPILED["short_flight"], COMPILED["guess_from_start"]
 
 
-@njit(types.void(types.float64[::1], types.int64[::1], types.int64), **OPTIONS)
-def find(m, at, order):
-    h, sign, start = load(m, STEP), load(m, SIGN), load(m, 0)
-    x, v, a, _ = motion_at(m, at, 0, order, start, h)
-    g1, g2 = sign * load(m, 1) * h, sign * load(m, 2) * (h * h)
-    g3 = sign * load(m, 3) * (h * h * h)
-    guess = guess_from_end((sign * start, g1, g2, g3), (x, v, a), sign, h)
-    time, speed = only_root(m, at, 0, order, start, sign, guess, h, ALL)
-    store(m, TIME, time)
-    store(m, SPEED, speed)
+class Order(NamedTuple):
+    order: int
 
 
-@njit(types.void(types.float64[::1], types.int64[::1], types.int64), **OPTIONS)
-def find_short(m, at, order):
-    h, sign, start = load(m, STEP), load(m, SIGN), load(m, 0)
-    _, _, _, bend = sweep(m, at, 0, order, h)
+class Few(NamedTuple):
+    """A group of lanes with the three series of one coordinate, and slots for what goes in and out."""
+
+    memory: Any
+    places: Any
+    sizes: Any
+    flags: Any
+    rows: Any
+
+
+PARTS = ("positions", "velocities", "accelerations")
+SLOTS = ("step", "sign", "time", "speed", "certain")
+STEP, SIGN, TIME, SPEED, CERTAIN = range(5)
+PLACES = len(SLOTS) + SERIES_LENGTH * np.arange(3)
+POSITIONS, VELOCITIES, ACCELERATIONS = PLACES
+SIZE = len(SLOTS) + 3 * SERIES_LENGTH
+LANES = LanesType("lanes of the tests of roots", SLOTS, PARTS, SERIES, "rows", "flags")
+_ARRAYS = [types.Array(from_dtype(dtype), 1, "C") for dtype in (FLAGS, ROW)]
+FEW = named_tuple(Few, types.float64[::1], types.int64[::1], named_tuple(Order, types.int64), *_ARRAYS)
+LanesType.tuples[LANES.name] = FEW
+shared = shared_as(LANES)
+
+
+def group(values, order):
+    return Few(values.reshape(-1), PLACES, Order(order), np.zeros(1, FLAGS), np.zeros(WIDTH, ROW))
+
+
+@njit(types.void(FEW), **OPTIONS)
+def find(few):
+    lanes = shared(few)
+    h, sign, series = lanes.step, lanes.sign, lanes.positions[0]
+    x, v, a, _ = motion_at(lanes, 0, series[0], h)
+    cubic = (sign * series[0], sign * series[1] * h, sign * series[2] * (h * h), sign * series[3] * (h * h * h))
+    guess = guess_from_end(cubic, (x, v, a), sign, h)
+    time, speed = only_root(lanes, Gap(0, series[0], sign, 0), guess, h, ALL)
+    lanes.time = time
+    lanes.speed = speed
+
+
+@njit(types.void(FEW), **OPTIONS)
+def find_short(few):
+    lanes = shared(few)
+    h, sign, series = lanes.step, lanes.sign, lanes.positions[0]
+    _, _, _, bend = sweep(lanes, 0, h)
     square = h * h
-    cubic = sign * start, sign * load(m, 1) * h, sign * load(m, 2) * square, sign * load(m, 3) * (square * h)
+    cubic = sign * series[0], sign * series[1] * h, sign * series[2] * square, sign * series[3] * (square * h)
     certain, flight = short_flight(cubic, bend)
-    guess = guess_from_start(cubic, (sign * load(m, 4) * square * square, sign * load(m, 5) * square * square * h), flight)
-    time, speed = only_root(m, at, 0, order, start, sign, guess * h, 2.0 * flight * h, certain)
-    store(m, TIME, time)
-    store(m, SPEED, speed)
-    store(m, CERTAIN, select(mask(certain), splat(1.0), splat(0.0)))
+    guess = guess_from_start(cubic, (sign * series[4] * square * square, sign * series[5] * square * square * h), flight)
+    time, speed = only_root(lanes, Gap(0, series[0], sign, 0), guess * h, 2.0 * flight * h, certain)
+    lanes.time = time
+    lanes.speed = speed
+    lanes.certain = select(mask(certain), splat(1.0), splat(0.0))
 
 
 @njit(types.void(types.float64[::1]), **OPTIONS)
@@ -107,17 +138,17 @@ def root_of(c):
 def test_roots_and_velocities_are_exact_to_rounding(kind, order):
     rng, errors = np.random.default_rng(order), []
     for _ in range(-(-400 // WIDTH)):
-        c, memory = positions_of(kind, order, rng), np.zeros((SIZE, WIDTH))
+        c, values = positions_of(kind, order, rng), np.zeros((SIZE, WIDTH))
         sign = rng.choice([-1.0, 1.0], WIDTH)
-        memory[: order + 1], memory[STEP], memory[SIGN] = (sign[:, None] * c).T, H, sign
-        memory[SERIES_LENGTH : SERIES_LENGTH + order] = (sign[:, None] * c[:, 1:] * np.arange(1, order + 1)).T
-        find(memory.reshape(-1), PLACES, order)
+        values[POSITIONS : POSITIONS + order + 1], values[STEP], values[SIGN] = (sign[:, None] * c).T, H, sign
+        values[VELOCITIES : VELOCITIES + order] = (sign[:, None] * c[:, 1:] * np.arange(1, order + 1)).T
+        find(group(values, order))
         for lane in range(WIDTH):
             root, slope = root_of(c[lane])
             size, bend = np.abs(c[lane] * H ** np.arange(order + 1)).sum(), 6.0 / H**2
             late = 8 * EPS * max(size, 1.0) / abs(float(slope))  # what rounding of the gap does to its root
-            errors.append(abs(float(memory[TIME, lane] - root)) / (late + EPS * H))
-            errors.append(abs(float(sign[lane] * memory[SPEED, lane] - slope)) / (bend * late + 16 * EPS * size / H))
+            errors.append(abs(float(values[TIME, lane] - root)) / (late + EPS * H))
+            errors.append(abs(float(sign[lane] * values[SPEED, lane] - slope)) / (bend * late + 16 * EPS * size / H))
     assert max(errors) <= 1.0
 
 
@@ -134,21 +165,21 @@ def flights_of(order, rng):
 def test_short_flights_that_are_certain_have_one_root_to_relative_rounding(order):
     rng, errors, count, total = np.random.default_rng(order), [], 0, -(-2000 // WIDTH)
     for _ in range(total):
-        (c, flight), memory = flights_of(order, rng), np.zeros((SIZE, WIDTH))
+        (c, flight), values = flights_of(order, rng), np.zeros((SIZE, WIDTH))
         sign, k = rng.choice([-1.0, 1.0], WIDTH), np.arange(1, order + 1)
         velocity = c[:, 1:] * k
-        memory[: order + 1], memory[STEP], memory[SIGN] = (sign[:, None] * c).T, H, sign
-        memory[SERIES_LENGTH : SERIES_LENGTH + order] = (sign[:, None] * velocity).T
-        memory[2 * SERIES_LENGTH : 2 * SERIES_LENGTH + order - 1] = (sign[:, None] * velocity[:, 1:] * k[:-1]).T
-        find_short(memory.reshape(-1), PLACES, order)
-        for lane in np.flatnonzero(memory[CERTAIN]):
-            p, time = np.polynomial.Polynomial(c[lane, 1:].astype(np.longdouble)), np.longdouble(memory[TIME, lane])
-            values = p(2 * flight[lane] * np.linspace(0.0, 1.0, 200))
-            assert (np.diff(values > 0) != 0).sum() == 1  # the gap over the time
+        values[POSITIONS : POSITIONS + order + 1], values[STEP], values[SIGN] = (sign[:, None] * c).T, H, sign
+        values[VELOCITIES : VELOCITIES + order] = (sign[:, None] * velocity).T
+        values[ACCELERATIONS : ACCELERATIONS + order - 1] = (sign[:, None] * velocity[:, 1:] * k[:-1]).T
+        find_short(group(values, order))
+        for lane in np.flatnonzero(values[CERTAIN]):
+            p, time = np.polynomial.Polynomial(c[lane, 1:].astype(np.longdouble)), np.longdouble(values[TIME, lane])
+            along = p(2 * flight[lane] * np.linspace(0.0, 1.0, 200))
+            assert (np.diff(along > 0) != 0).sum() == 1  # the gap over the time
             root = time - p(time) / p.deriv()(time)
             slope = root * p.deriv()(root)
             errors.append(abs(float((time - root) / root)) / EPS)
-            errors.append(abs(float((sign[lane] * memory[SPEED, lane] - slope) / slope)) / EPS)
+            errors.append(abs(float((sign[lane] * values[SPEED, lane] - slope) / slope)) / EPS)
             count += 1
     assert count > 0.3 * total * WIDTH
     assert max(errors) < 32
@@ -157,17 +188,17 @@ def test_short_flights_that_are_certain_have_one_root_to_relative_rounding(order
 def test_rough_functions_are_as_good_as_they_say():
     rng = np.random.default_rng(0)
     for exponent in (-290, -20, -1, 0, 1, 20, 290):
-        memory = np.zeros((5, WIDTH))
-        memory[0] = rng.uniform(1.0, 10.0, WIDTH) * 10.0**exponent
-        rough(memory.reshape(-1))
-        a, log, power, inverse, root = memory
+        values = np.zeros((5, WIDTH))
+        values[0] = rng.uniform(1.0, 10.0, WIDTH) * 10.0**exponent
+        rough(values.reshape(-1))
+        a, log, power, inverse, root = values
         assert np.abs(log - np.log2(a)).max() < 0.05
         assert np.abs(power / 2.0**log - 1.0).max() < 0.004
         assert np.abs(inverse * a - 1.0).max() < 1e-5
         assert np.abs(root / np.sqrt(a) - 1.0).max() < 0.002
-    memory[0] = np.linspace(-2.0, -1.0, WIDTH)
-    rough(memory.reshape(-1))
-    assert np.abs(memory[3] * memory[0] - 1.0).max() < 1e-5
-    memory[0] = 0.0
-    rough(memory.reshape(-1))
-    assert (memory[4] == 0.0).all()
+    values[0] = np.linspace(-2.0, -1.0, WIDTH)
+    rough(values.reshape(-1))
+    assert np.abs(values[3] * values[0] - 1.0).max() < 1e-5
+    values[0] = 0.0
+    rough(values.reshape(-1))
+    assert (values[4] == 0.0).all()

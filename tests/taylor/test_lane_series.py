@@ -9,14 +9,15 @@ from numba import njit, types
 from power_series import solution
 from test_series import OPERATIONS, agrees, force
 
-from saltus.flow.kernel.memory_layout import HIGHEST_ORDER, LOWEST_ORDER, LanePart, LaneSlot
+from saltus.flow.kernel.memory_layout import HIGHEST_ORDER, LOWEST_ORDER
 from saltus.flow.kernel.memory_layout import SERIES_LENGTH as STRIDE
 from saltus.flow.kernel.structures import program
 from saltus.flow.lanes.compiled_lanes import load_lane_functions
 from saltus.flow.lanes.function_types import LANE_SERIES
+from saltus.flow.lanes.memory import SLOTS
 from saltus.flow.lanes.threads import lane_order
 from saltus.systems import Harmonic, Load, Model, Record, System, WallOscillator
-from saltus.taylor import written_type
+from saltus.taylor import private_numba as jit
 from saltus.taylor.graph import RECORD_WIDTH
 from saltus.taylor.vectors import WIDTH
 
@@ -42,6 +43,7 @@ class Many(Model):
 
     coordinates: ClassVar[tuple[str, ...]] = tuple(f"x{i}" for i in range(len(NAMES) + len(OF_RECORD)))
     channels: ClassVar[tuple[str, ...]] = ("force", "pulse")
+    sides: ClassVar[tuple[int, ...]] = ()
 
     def acceleration(self, t, position, velocity, side, load):
         states = list(zip(position, velocity, strict=True))
@@ -55,27 +57,29 @@ class LaneSeries:
 
     def __init__(self, system):
         self.run = program(system)
-        self.slots, (self.function, *_) = load_lane_functions(self.run.trace)
-        self.call = njit(types.void(written_type(LANE_SERIES), types.float64[::1], types.int64))(_call)
+        self.plan, (self.function, *_) = load_lane_functions(self.run.trace)
+        with jit.pointers():
+            kind = jit.function_type(LANE_SERIES)
+            self.call = njit(types.void(kind, types.float64[::1], types.int64))(_call)
 
     def coefficients(self, states, order):
         """Of positions, velocities, accelerations, shape (lanes, coordinates, STRIDE); `states` = (t, positions, velocities)."""
-        places, rows = self.slots.places, self.slots.rows
-        m = np.full(self.slots.end * WIDTH, np.nan)
+        places, rows = self.plan.places, self.plan.rows
+        m = np.full(self.plan.end * WIDTH, np.nan)
         memory = m.reshape(-1, WIDTH)
-        memory[LaneSlot.ORIGIN], memory[LaneSlot.SIDE] = 0.0, 1.0
+        memory[SLOTS.origin], memory[SLOTS.side] = 0.0, 1.0
         for lane in range(WIDTH):
-            memory[LaneSlot.NOW, lane], q, v = states[lane % len(states)]
-            memory[places[LanePart.POSITION] : places[LanePart.POSITION] + rows, lane] = q
-            memory[places[LanePart.VELOCITY] : places[LanePart.VELOCITY] + rows, lane] = v
-        for part, values in ((LanePart.PARAMETERS, self.run.env[0]), (LanePart.CONSTANTS, self.run.env[1])):
-            memory[places[part] : places[part] + len(values)] = values[:, None]
-        for k in range(self.slots.records * RECORD_WIDTH):
-            memory[places[LanePart.RECORDS] + k] = PIECE[k]
+            memory[SLOTS.now, lane], q, v = states[lane % len(states)]
+            memory[places.position : places.position + rows, lane] = q
+            memory[places.velocity : places.velocity + rows, lane] = v
+        for part, values in ((places.parameters, self.run.env[0]), (places.constants, self.run.env[1])):
+            memory[part : part + len(values)] = values[:, None]
+        for k in range(self.plan.records * RECORD_WIDTH):
+            memory[places.records + k] = PIECE[k]
         self.call(self.function, m, order)
         series = [
-            memory[places[part] : places[part] + rows * STRIDE].reshape(rows, STRIDE, WIDTH)
-            for part in (LanePart.POSITIONS, LanePart.VELOCITIES, LanePart.ACCELERATIONS)
+            memory[part : part + rows * STRIDE].reshape(rows, STRIDE, WIDTH)
+            for part in (places.positions, places.velocities, places.accelerations)
         ]
         return [part.transpose(2, 0, 1) for part in series]
 

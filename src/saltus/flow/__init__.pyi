@@ -7,13 +7,11 @@ from .kernel.orbit_segments import SegmentFollower
 from .kernel.structures import Program, limits_of, program, taylor_order
 from .lanes.capture_speeds import captured_between
 from .lanes.compiled_lanes import load_advance, load_driver, load_helpers
-from .lanes.dataset_reading import stop_names, stroboscopic
-from .lanes.ensemble import compiled_lanes, simulate_many
-from .lanes.ensemble_dataset import extrema_names
+from .lanes.ensemble import TangentEnsemble, compiled_lanes, simulate_many
+from .lanes.ensemble_dataset import extrema_names, stop_names, stroboscopic
 from .lanes.inputs import Inputs, read_inputs
-from .lanes.tangent_ensemble import TangentEnsemble
+from .lanes.options import EnsembleOptions
 from .lanes.threads import Jobs, Lanes, available_cores, share_cores
-from .lanes.wanted import Wanted
 from .long_time.approach import approached
 from .long_time.load_release import Release, contact_pull, load_releases, peak_near
 from .long_time.recurrence import (
@@ -45,6 +43,7 @@ __all__ = [
     "ContactRegularity",
     "DenseOutput",
     "Ending",
+    "EnsembleOptions",
     "Event",
     "EventCode",
     "EventKind",
@@ -68,7 +67,6 @@ __all__ = [
     "Stop",
     "TangentEnsemble",
     "Validity",
-    "Wanted",
     "approached",
     "available_cores",
     "captured_between",

@@ -118,20 +118,20 @@ lean_jit = _njit(within=True, **LEAN)
 inline_jit = _njit(within=True, **LEAN, forceinline=True)  # for functions that every step of the lanes calls
 
 
-def _name_fields() -> None:
-    """Let a `Reference` to a named tuple have its fields as attributes."""
+def name_attributes(kind: type, of: Callable[[Any, str], Any]) -> None:
+    """Let values of a type have attributes: `of` gives the type of one by its name, or None."""
 
-    class Fields(_private("numba.core.typing.templates", "AttributeTemplate")):  # type: ignore[misc]
-        key = Reference
+    class Attributes(_private("numba.core.typing.templates", "AttributeTemplate")):  # type: ignore[misc]
+        key = kind
 
         def generic_resolve(self, value: Any, attr: str) -> Any:
             """The type of an attribute, or None."""
-            return field_type(value, attr)
+            return of(value, attr)
 
-    infer_getattr(Fields)
+    infer_getattr(Attributes)
 
 
-_name_fields()
+name_attributes(Reference, field_type)
 
 
 # --- compiled at once, and kept on disk ------------------------------------------------------------------------------------

@@ -1,37 +1,35 @@
 """A step of all lanes of a model with several contacts: the smooth motion up to the first closing of a gap, and impacts.
 
-Its compiled part goes into one module with that of `lanes/driver.py`, in the place of `one_contact/lane_step.py`, and with
-those of `lanes/contact_steps.py` and `lanes/lane_impacts.py`. Lanes move together as long as all closed contacts certainly push
-and at most one gap closes. Releases, contacts that close together, slow impacts and rest are left to the scalar kernel, and so
-are all events of motions with a tangent. The scalar kernel does all steps of motions with frictions.
+Its compiled part goes into one module with that of `lanes/driver.py`, in the place of `one_contact/lane_step.py`, and with that
+of `lane_impacts.py`. Lanes move together as long as all closed contacts certainly push and at most one gap closes. Releases,
+contacts that close together, slow impacts and rest are left to the scalar kernel, and so are all events of motions with a
+tangent. The scalar kernel does all steps of motions with frictions.
+
+If exactly one coordinate is free in every lane, all lanes share a series of this coordinate alone, even if it is not the same one
+in all lanes (`one_free.py`).
 """
 
 from __future__ import annotations
 
-import numpy as np
-
+from saltus.flow.contacts.lane_impacts import closed_lanes, resolve_impacts, write_closed
 from saltus.flow.contacts.layout import ContactColumn, FrictionColumn
-from saltus.flow.contacts.solver_memory import solver_arrays
 from saltus.flow.kernel.layout import Mode
-from saltus.flow.kernel.memory import MOTION
-from saltus.flow.kernel.memory_layout import SERIES_LENGTH, LanePart
-from saltus.flow.lanes.contact_steps import free_step, of_free, one_free_step, one_is_free, pass_ends_of_free
-from saltus.flow.lanes.contacts_of_lane import tell_closed
-from saltus.flow.lanes.lane_impacts import resolve_impacts
-from saltus.flow.lanes.lane_layout import Code, Flag, Helper, JobArray, LaneArray, LaneLabel, Size, Slot
-from saltus.flow.lanes.lane_steps import commit
-from saltus.flow.lanes.sampling import LONGEST_RECURRENCE, pass_ends, record_others, record_range
+from saltus.flow.lanes.gap_roots import find_contact
+from saltus.flow.lanes.lane_steps import both_at, commit, natural_step, row_step, series_true, state_size, sweep
+from saltus.flow.lanes.memory import FAST, Course, Gap, Step
+from saltus.flow.lanes.sampling import keep_ended, pass_ends, record_others, record_range
 from saltus.taylor import (
-    WIDTH,
+    ALL,
+    absolute,
     bits,
     first_lane,
+    fma,
     inline_jit,
-    jit,
     lane_count,
     lean_jit,
-    load,
     mask,
-    put,
+    minimum,
+    one,
     select,
     splat,
     vector_lane,
@@ -39,50 +37,21 @@ from saltus.taylor import (
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
-
 COST_OF_SEVERAL = 3  # The time of a step with the series of all coordinates, in units of that with the series of one.
-
-
-@jit
-def lane_arrays(sizes, at):
-    """Arrays with a row for each lane, in the places of `LaneArray`."""
-    own, count, frictions = sizes[Size.OWN], sizes[Size.CONTACTS], sizes[Size.FRICTIONS]
-    return (
-        np.zeros((WIDTH, 8), dtype=np.int64),
-        np.zeros((WIDTH, 2)),
-        np.zeros((WIDTH, at[LanePart.RECORDS] - at[LanePart.CONSTANTS])),
-        np.zeros((WIDTH, own * own + count * count + count + frictions)),
-        np.zeros((WIDTH, 2 * LONGEST_RECURRENCE, 2 * own)),
-        np.zeros((WIDTH, LONGEST_RECURRENCE + 1), dtype=np.int64),
-        np.zeros((WIDTH, count + frictions, ContactColumn.WAITS + 1), dtype=np.int64),
-    )
-
-
-@jit
-def lane_space(sizes, at):
-    """Room for two polynomials of one lane, and for an impact: a record MOTION, `state`, `contacts` and the solver's arrays."""
-    own, count, frictions = sizes[Size.OWN], sizes[Size.CONTACTS], sizes[Size.FRICTIONS]
-    return (
-        np.zeros(SERIES_LENGTH + 2),
-        np.zeros(SERIES_LENGTH + 2),
-        np.zeros(1, dtype=MOTION),
-        np.zeros(2 * own),
-        np.zeros((count, ContactColumn.WAITS + 1), dtype=np.int64),
-        solver_arrays(own, count, 0, frictions),
-    )
+TOGETHER = 1e-6  # Gaps that close within this share of a step may close together, which the scalar kernel decides.
+SMALL_GAP = 1e-9  # A gap smaller than this, when another one closes, may close together with it.
 
 
 @lean_jit
-def begin_contact(lane, code, sizes, at, m, lanes, env, state, piece):
+def begin_contact(lane, env, state):
     """Tell a lane where its contacts are; returns the mode in which a motion begins, and 1 plus the bits of closed contacts."""
-    own, count = sizes[Size.OWN], sizes[Size.CONTACTS]
-    solved, contacts = lanes[LaneArray.GEOMETRY][lane], lanes[LaneArray.CONTACTS][lane]
-    code[Code.GEOMETRY](env, piece, m, solved)  # any state will do: positions depend on parameters alone
+    own, count, sizes = lane.sizes.own, lane.sizes.contacts, lane.sizes
+    solved, contacts, matrices = lane.geometry[lane.index], lane.contact_rows[lane.index], lane.code.geometry
+    matrices(env, lane.piece, lane.memory, solved)  # any state will do: positions depend on parameters alone
     mode = Mode.ARC
     for i in range(count):
-        coordinate, position = sizes[Size.CONTACTS + 1 + i], solved[own * own + count * count + i]
-        put(m, at[LanePart.CONTACTS] + i, lane, position)
-        sign = sizes[Size.CONTACTS + 1 + count + i]
+        coordinate, position, sign = sizes.coordinates[i], solved[own * own + count * count + i], sizes.signs[i]
+        lane.contacts[i] = position
         gap, rate = sign * (state[coordinate] - position), sign * state[state.size // 2 + coordinate]
         contacts[i, ContactColumn.COORDINATE] = coordinate
         contacts[i, ContactColumn.CLOSED] = 1 if gap == 0.0 and rate == 0.0 else 0
@@ -92,70 +61,253 @@ def begin_contact(lane, code, sizes, at, m, lanes, env, state, piece):
             mode = Mode.BEYOND
         elif gap == 0.0 and mode == Mode.ARC:
             mode = Mode.CONTACT
-    for k in range(sizes[Size.FRICTIONS]):
-        coordinate, row = sizes[Size.CONTACTS + 1 + 2 * count + k], contacts[count + k]
+    for k in range(sizes.frictions):
+        coordinate, row = sizes.coordinates[count + k], contacts[count + k]
         rate = state[state.size // 2 + coordinate] - solved[own * own + count * count + count + k]
         row[FrictionColumn.COORDINATE], row[FrictionColumn.SKIP] = coordinate, 0
         row[FrictionColumn.SLIDES] = 1 if rate > 0.0 else -1 if rate < 0.0 else 0
         row[FrictionColumn.MARGIN] = row[FrictionColumn.REACHED] = 0
         mode = Mode.CONTACT if mode == Mode.ARC else mode
-    lanes[LaneArray.LABELS][lane, LaneLabel.LEAVE_BY] = 1 if mode == Mode.CONTACT else 0  # derivatives are then one-sided
-    return mode, 1 + tell_closed(lane, at, m, contacts[:count])
+    lane.leave_by = 1 if mode == Mode.CONTACT else 0  # derivatives are then one-sided
+    return mode, 1 + write_closed(lane, contacts[:count])
+
+
+@lean_jit
+def stays_positive(series, order, h):
+    """Bits of the lanes in which a series is certainly positive on [0, h]: by the Bernstein coefficients of its cubic part, and a
+    bound of the rest."""
+    rest = splat(0.0)
+    for k in range(order - 1, 3, -1):
+        rest = fma(rest, h, absolute(series[k]))
+    square = h * h
+    c0, c1, c2 = series[0], h * series[1], square * series[2]
+    end = c0 + c1 + c2 + square * h * series[3]
+    low = minimum(minimum(c0, c0 + c1 * (1.0 / 3.0)), minimum(c0 + (2.0 * c1 + c2) * (1.0 / 3.0), end))
+    return bits(low > rest * (square * square))
+
+
+@lean_jit
+def guards_certain(lanes, h):
+    """Bits of the lanes in which certainly, over the step, all reactions of closed contacts and all margins stay positive."""
+    sure = ALL
+    for i in range(lanes.sizes.margins):
+        closed = closed_lanes(lanes, i) if i < lanes.sizes.contacts else ALL
+        if closed:
+            sure &= stays_positive(lanes.margins[i], lanes.sizes.order, h) | ~closed
+    return sure
 
 
 @inline_jit
-def step_all(code, scalar, sizes, at, m, flags, settings, limits, helpers, lanes, jobs, tables, space):
+def first_closing(lanes, h, alive):
+    """The first gap that closes in the step. Returns bits of the lanes in which one closes, bits of the lanes in doubt, the
+    times, and the contacts."""
+    hit, doubtful, tau, which = 0, 0, h, splat(0.0)
+    for i in range(lanes.sizes.contacts):
+        row = lanes.sizes.coordinates[i]
+        opened = alive & bits(lanes.free[row] > 0.5)
+        if opened == 0:
+            continue
+        start = lanes.position[row] - lanes.contacts[i]
+        mean, v, a, bend = sweep(lanes, row, h)
+        gap = Gap(row, start, splat(1.0 * lanes.sizes.signs[i]), bits(start * start <= 0.0))
+        closes, unclear, _, when, _ = find_contact(lanes, gap, h, (fma(mean, h, start), v, a, bend), opened, 0)
+        doubtful |= unclear | (hit & closes & bits(absolute(when - tau) < TOGETHER * h))
+        first = closes & (~hit | bits(when < tau))
+        tau, which = select(mask(first), when, tau), select(mask(first), splat(1.0 * i), which)
+        hit |= closes
+    return hit, doubtful, tau, which
+
+
+@inline_jit
+def put_new_state(lanes, tau, hit, which):
+    """Put the state at `tau`, with the contact that closes exactly at its position. Returns bits of the lanes in which another
+    gap is nearly 0 as well."""
+    near = 0
+    for row in range(lanes.sizes.rows):
+        x, v = both_at(lanes, row, tau)
+        lanes.new_position[row], lanes.new_velocity[row] = x, v
+    for i in range(lanes.sizes.contacts if hit else 0):
+        row, contact = lanes.sizes.coordinates[i], lanes.contacts[i]
+        x, this = lanes.new_position[row], hit & bits(absolute(which - 1.0 * i) < 0.5)
+        opened = bits(lanes.free[row] > 0.5)
+        near |= hit & ~this & opened & bits((x - contact) * (1.0 * lanes.sizes.signs[i]) < SMALL_GAP)
+        lanes.new_position[row] = select(mask(this), contact, x)
+    return near
+
+
+@inline_jit
+def free_step(lanes, alive):
+    """A step of all lanes, whichever coordinates are free, with the new state in its slots.
+
+    Returns bits of the lanes in which a gap closes, bits of the lanes in which nothing is in doubt, and the step.
+    """
+    series = lanes.code.series
+    series(lanes.memory, lanes.sizes.order)
+    size, now, limit = state_size(lanes), lanes.now, lanes.step_limit
+    natural = natural_step(lanes, size)
+    h = minimum(natural, limit - now)
+    sound = bits(natural > lanes.settings.shortest_step) & bits(size < FAST)
+    hit, doubtful, tau, which = first_closing(lanes, h, alive & sound)
+    sound &= ~doubtful & ~put_new_state(lanes, tau, hit, which) & guards_certain(lanes, tau)
+    lanes.new_time = select(mask(bits(natural >= limit - now) & ~hit), limit, now + tau)
+    if lanes.sizes.checked > 0:
+        sound &= series_true(lanes, tau, size)
+    bend = splat(0.0)
+    if lanes.sizes.extrema > 0:
+        _, _, _, bend = sweep(lanes, 0, h)
+    return hit, sound, Step(h, tau, bend, which)
+
+
+# --- one coordinate is free ------------------------------------------------------------------------------------------------
+
+
+@inline_jit
+def add_second_derivative(series, other, order):
+    """Add another series' second derivative to a series, up to the order below order - 2."""
+    for k in range(order - 2):
+        series[k] = fma(other[k + 2], 1.0 * ((k + 1) * (k + 2)), series[k])
+
+
+@inline_jit
+def one_is_free(lanes):
+    """Bits of the lanes in which exactly one coordinate is free."""
+    count = splat(0.0)
+    for row in range(lanes.sizes.own):
+        count = count + lanes.free[row]
+    return bits(absolute(count - 1.0) < 0.5)
+
+
+@lean_jit
+def free_guards_certain(lanes, tau):
+    """`guards_certain` where one coordinate is free."""
+    sure, order = ALL, lanes.sizes.order
+    for i in range(lanes.sizes.guards):
+        guard = lanes.margins[i]
+        if i < lanes.sizes.own - 1:
+            add_second_derivative(guard, lanes.positions[i + 1], order)
+            sure &= stays_positive(guard, order - 2, tau)
+        else:
+            sure &= stays_positive(guard, order, tau)
+    for i in range(lanes.sizes.constant_guards):
+        sure &= bits(lanes.constant_guards[i] > 0.0)
+    return sure
+
+
+@inline_jit
+def one_free_step(lanes, alive):
+    """As `free_step`, for lanes in which one coordinate is free; its series are in row 0, whichever coordinate it is."""
+    x, v, sign, contact, which = splat(0.0), splat(0.0), splat(1.0), splat(0.0), splat(0.0)
+    for i in range(lanes.sizes.contacts):
+        row = lanes.sizes.coordinates[i]
+        free = mask(bits(lanes.free[row] > 0.5))
+        x, v = select(free, lanes.position[row], x), select(free, lanes.velocity[row], v)
+        sign = select(free, splat(1.0 * lanes.sizes.signs[i]), sign)
+        contact, which = select(free, lanes.contacts[i], contact), select(free, splat(1.0 * i), which)
+    lanes.free_position, lanes.free_velocity, series = x, v, lanes.code.one_free
+    series(lanes.memory, lanes.sizes.order)
+    size, now, limit = state_size(lanes), lanes.now, lanes.step_limit
+    natural = row_step(lanes.velocities[0], lanes.sizes.order, size, lanes.settings.limits)
+    h, start = minimum(natural, limit - now), x - contact
+    sound = bits(natural > lanes.settings.shortest_step) & bits(size < FAST)
+    mean, v, a, bend = sweep(lanes, 0, h)
+    gap, end = Gap(0, start, sign, bits(start * start <= 0.0)), (fma(mean, h, start), v, a, bend)
+    hit, doubtful, _, tau, at_root = find_contact(lanes, gap, h, end, alive & sound, 0)
+    sound &= ~doubtful & free_guards_certain(lanes, tau)
+    closing = mask(hit)
+    x, v = select(closing, contact, fma(mean, h, x)), select(closing, at_root, v)
+    for row in range(lanes.sizes.own):
+        free = mask(bits(lanes.free[row] > 0.5))
+        lanes.new_position[row] = select(free, x, lanes.position[row])
+        lanes.new_velocity[row] = select(free, v, splat(0.0))
+    lanes.new_time = select(mask(bits(natural >= limit - now) & ~hit), limit, now + tau)
+    return hit, sound, Step(h, tau, bend, which)
+
+
+@inline_jit
+def of_free(lanes, part, which):
+    """The value, in a part of the memory, for the coordinate of the contact `which`, which was free in the step."""
+    value = splat(0.0)
+    for i in range(lanes.sizes.contacts):
+        was_free = mask(bits(absolute(which - 1.0 * i) < 0.5))
+        value = select(was_free, part[lanes.sizes.coordinates[i]], value)
+    return value
+
+
+@inline_jit
+def pass_ends_of_free(lanes, step, past):
+    """`pass_ends` for lanes in which only the coordinate of one contact was free: the other coordinates stay constant."""
+    since, chosen = lanes.period_end - lanes.now, mask(past)
+    x, v = both_at(lanes, 0, since)
+    for i in range(lanes.sizes.contacts):
+        row, was_free = lanes.sizes.coordinates[i], mask(bits(absolute(step.contact - 1.0 * i) < 0.5))
+        lanes.ended_position[row] = select(chosen, select(was_free, x, lanes.position[row]), lanes.ended_position[row])
+        lanes.ended_velocity[row] = select(chosen, select(was_free, v, splat(0.0)), lanes.ended_velocity[row])
+    if lanes.sizes.extrema > 0:
+        record_range(lanes, 0, Course(splat(0.0), since, lanes.free_velocity, x, v, step.h, step.bend), past)
+    keep_ended(lanes, past)
+
+
+# --- all lanes ----------------------------------------------------------------------------------------------------------------
+
+
+@inline_jit
+def step_all(lanes):
     """One step, either of all lanes in which exactly one coordinate is free, or of all other lanes: of those that are more
     numerous relative to the cost of their step.
 
     The choice changes no motion, as the other lanes only wait. Returns bits for the scalar kernel, bits captured, and bits past
     the end of their forcing period.
     """
-    alive, one = flags[Flag.BUSY] & ~flags[Flag.SCALAR], False
-    if sizes[Size.ONE_FREE] > 0:
-        with_one = alive & one_is_free(sizes, at, m)
-        one = lane_count(alive & ~with_one) <= COST_OF_SEVERAL * lane_count(with_one)
-        alive = with_one if one else alive & ~with_one
-    if one:
-        hit, sound, h, tau, bend, which = one_free_step(code, sizes, at, m, settings, limits, alive, helpers, space)
+    alive, single = lanes.busy & ~lanes.scalar, False
+    if lanes.sizes.one_free > 0:
+        with_one = alive & one_is_free(lanes)
+        single = lane_count(alive & ~with_one) <= COST_OF_SEVERAL * lane_count(with_one)
+        alive = with_one if single else alive & ~with_one
+    if single:
+        hit, sound, step = one_free_step(lanes, alive)
     else:
-        hit, sound, h, tau, bend, which = free_step(code, sizes, at, m, settings, limits, alive, helpers, space)
+        hit, sound, step = free_step(lanes, alive)
     hit &= sound & alive
-    resolved, moved, waiting = 0, alive & sound & ~hit, 0
-    if hit and sizes[Size.COLUMNS] == 0:  # impacts with a tangent are left to the scalar kernel
-        resolved = resolve_impacts(code, sizes, at, m, settings, hit, which)
-        waiting = hit & ~resolved
-    while waiting:
-        lane = first_lane(waiting)
-        waiting &= waiting - 1
-        impact = helpers[Helper.IMPACT]
-        which_one = 1 << int(vector_lane(which, lane))
-        if impact(lane, which_one, scalar, sizes, at, m, settings, lanes, jobs[JobArray.PARAMETERS], tables, space):
-            resolved |= 1 << lane
+    resolved, moved = 0, alive & sound & ~hit
+    if hit and lanes.sizes.columns == 0:  # impacts with a tangent are left to the scalar kernel
+        resolved = resolve_all(lanes, hit, step.contact)
     moved |= resolved
-    past = moved & bits(load(m, Slot.NEW_TIME) > load(m, Slot.PERIOD_END))
-    if past and sizes[Size.ENDS_ASKED] > 0:
-        if one:
-            pass_ends_of_free(m, at, sizes, h, bend, which, past, helpers, space)
+    past = moved & bits(lanes.new_time > lanes.period_end)
+    if past and lanes.sizes.ends_asked > 0:
+        if single:
+            pass_ends_of_free(lanes, step, past)
         else:
-            pass_ends(m, at, sizes, h, bend, past, helpers, space[0], space[1])
-    if sizes[Size.EXTREMA] > 0:
-        record_step(m, at, sizes, one, h, bend, tau, which, past, moved, helpers, space)
-    commit(at, m, moved, resolved, load(m, Slot.NEW_SPEED))
+            pass_ends(lanes, step, past)
+    if lanes.sizes.extrema > 0:
+        record_step(lanes, step, single, past, moved)
+    commit(lanes, moved, resolved, lanes.new_speed)
     return alive & ~moved, 0, past
 
 
 @inline_jit
-def record_step(m, at, sizes, one, h, bend, tau, which, past, moved, helpers, space):
+def resolve_all(lanes, hit, which):
+    """Apply the impact law in the lanes in `hit`, together where that is possible; returns the resolved lanes."""
+    resolved = resolve_impacts(lanes, hit, which)
+    waiting = hit & ~resolved
+    while waiting:
+        i, impact = first_lane(waiting), lanes.helpers.impact
+        waiting &= waiting - 1
+        if impact(one(lanes, i), 1 << int(vector_lane(which, i))):
+            resolved |= 1 << i
+    return resolved
+
+
+@inline_jit
+def record_step(lanes, step, single, past, moved):
     """Record the extrema of all coordinates up to the new state; in lanes `past` the end of a period, from this end."""
-    after, positions, velocities = mask(past), at[LanePart.NEW_POSITION], at[LanePart.NEW_VELOCITY]
-    begin = select(after, load(m, Slot.PERIOD_END) - load(m, Slot.NOW), splat(0.0))
-    if one:  # held coordinates are constant, and the records of the period begin with them
-        v_begin = select(after, of_free(m, sizes, at[LanePart.ENDED_VELOCITY], which), load(m, Slot.FREE_VELOCITY))
-        x, v = of_free(m, sizes, positions, which), of_free(m, sizes, velocities, which)
-        record_range(m, at, 0, sizes, h, bend, begin, v_begin, tau, x, v, moved, helpers, space[0], space[1])
+    after, tau = mask(past), step.taken
+    begin = select(after, lanes.period_end - lanes.now, splat(0.0))
+    if single:  # held coordinates are constant, and the records of the period begin with them
+        v_begin = select(after, of_free(lanes, lanes.ended_velocity, step.contact), lanes.free_velocity)
+        x, v = of_free(lanes, lanes.new_position, step.contact), of_free(lanes, lanes.new_velocity, step.contact)
+        record_range(lanes, 0, Course(begin, tau, v_begin, x, v, step.h, step.bend), moved)
     else:
-        v_begin, x, v = load(m, at[LanePart.ENDED_VELOCITY]), load(m, positions), load(m, velocities)
-        v_begin = select(after, v_begin, load(m, at[LanePart.VELOCITY]))
-        record_range(m, at, 0, sizes, h, bend, begin, v_begin, tau, x, v, moved, helpers, space[0], space[1])
-        record_others(m, at, sizes, h, past, tau, moved, helpers, space[0], space[1])
+        v_begin = select(after, lanes.ended_velocity[0], lanes.velocity[0])
+        x, v = lanes.new_position[0], lanes.new_velocity[0]
+        record_range(lanes, 0, Course(begin, tau, v_begin, x, v, step.h, step.bend), moved)
+        record_others(lanes, step, past, moved)

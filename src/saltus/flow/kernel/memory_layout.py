@@ -40,46 +40,7 @@ class ReleaseDetail(IntEnum):
     AT_NONE = 2  # neither, so that the release has no derivative
 
 
-class LaneSlot(IntEnum):
-    """The slots of the lanes' memory that the generated functions read or write besides the parts of `LanePart`."""
-
-    NOW = 0  # time within the forcing period
-    ORIGIN = 1  # time at which the forcing period began
-    SIDE = 2
-    NEW_TIME = 3  # the time at the end of the step
-    NEW_SIDE = 4  # after an impact
-    FREE_POSITION = 32  # with several contacts, where only one coordinate is free: this coordinate
-    FREE_VELOCITY = 33
-
-
-class LanePart(IntEnum):
-    """The parts of the lanes' memory behind the slots that do not depend on the structure, in their order."""
-
-    POSITION = 0
-    VELOCITY = 1
-    NEW_POSITION = 2  # at the end of the step
-    NEW_VELOCITY = 3
-    AFTER_POSITION = 4  # after an impact at the end of the step
-    AFTER_VELOCITY = 5
-    ENDED_POSITION = 6  # at the end of the last forcing period
-    ENDED_VELOCITY = 7
-    PARAMETERS = 8
-    FREE = 9  # with several contacts: 1 for each coordinate that no contact holds, else 0
-    CONTACTS = 10  # the contacts' positions
-    MASS = 11  # the mass matrix at the new state, by rows
-    RESTITUTION = 12  # E by rows
-    IMPULSES = 13  # room for the impulses of an impact
-    CONSTANT_GUARDS = 14  # margins that do not change while one coordinate is free
-    CONSTANTS = 15
-    RECORDS = 16
-    POSITIONS = 17  # from here on Taylor series, each of SERIES_LENGTH slots
-    VELOCITIES = 18
-    ACCELERATIONS = 19
-    MARGINS = 20  # with the reactions of several contacts before them
-
-
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
-FIRST_PART = 36  # slot: those before it do not depend on the structure
 LOWEST_ORDER, HIGHEST_ORDER = 14, 22  # of a lane's series, at 1e-6 and at 1e-15; even, as coefficients are made in pairs
 SERIES_LENGTH = HIGHEST_ORDER + 1

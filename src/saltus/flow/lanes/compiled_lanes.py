@@ -9,34 +9,29 @@ from functools import cache
 from types import ModuleType
 from typing import Any
 
-from saltus.flow.contacts import complementarity, solver_memory
+from saltus.flow.contacts import complementarity, lane_handoff, lane_impacts, scalar_impact, solver_memory
 from saltus.flow.contacts import impacts as contact_impacts
-from saltus.flow.contacts import lane_step as several_contacts
+from saltus.flow.contacts import lane_step as contacts_step
 from saltus.flow.contacts import layout as contact_layout
 from saltus.flow.kernel import function_types as scalar_types
 from saltus.flow.kernel import layout as kernel_layout
-from saltus.flow.kernel import memory, memory_layout, roots, steps
+from saltus.flow.kernel import memory as kernel_memory
+from saltus.flow.kernel import memory_layout, roots, steps
 from saltus.flow.kernel.compiled import contacts_module, kernel_module
 from saltus.flow.lanes import (
-    contact_function_types,
-    contact_steps,
-    contacts_handoff,
-    contacts_of_lane,
     driver,
     forcing_periods,
     function_types,
-    lane_impacts,
-    lane_layout,
-    lane_state,
+    gap_roots,
+    handoff,
     lane_steps,
-    meeting,
+    memory,
     sampling,
-    scalar_fallback,
-    scalar_handoff,
 )
-from saltus.flow.lanes.lane_functions import Slots, lane_functions, slots_of
-from saltus.flow.one_contact import lane_step as one_contact
-from saltus.flow.one_contact import sides as contact_side
+from saltus.flow.lanes.lane_functions import lane_functions, memory_plan
+from saltus.flow.lanes.memory import MemoryPlan
+from saltus.flow.one_contact import lane_handoff as one_contact_handoff
+from saltus.flow.one_contact import lane_step, sides
 from saltus.taylor import (
     WIDTH,
     Trace,
@@ -45,6 +40,7 @@ from saltus.taylor import (
     digest,
     entry_point,
     is_compiled,
+    lane_memory,
     lane_vectors,
     load_functions,
     load_module,
@@ -55,19 +51,23 @@ from saltus.taylor import (
     vectors,
 )
 
-_TYPES = (memory, scalar_types, function_types, contact_function_types, vectors, lane_vectors)
+_TYPES = (scalar_types, kernel_memory, function_types, memory, vectors, lane_memory, lane_vectors)
 _WRITTEN_BY = digest(*(source_of(module) for module in _TYPES))
 _SIGNATURES = f"""import math
 
 import numpy as np
 
 from saltus.flow.kernel.memory import *
+from saltus.flow.lanes import function_types
 from saltus.flow.lanes.function_types import *
+from saltus.flow.lanes.memory import Closing, Course, Gap, Step
+from saltus.taylor.lane_memory import one
 from saltus.taylor.lane_vectors import *
 from saltus.taylor.numba_types import by_reference
 from saltus.taylor.private_numba import cached_jit, inline_jit, jit, lean_jit, pointed_jit
 # types and vectors of {_WRITTEN_BY}, for {WIDTH} lanes
 """
+_OF_CONTACTS = "shared, RUN_LANES, LANE_ROOT, SCALAR_MOTION, CONTACTS_IMPACT = function_types.CONTACTS\n"
 
 
 @cache
@@ -77,25 +77,15 @@ def load_driver(several: bool = False) -> Callable[..., None]:
 
 
 def _driver_text(several: bool) -> str:
-    of_several = (
-        contact_layout,
-        solver_memory,
-        complementarity,
-        contact_impacts,
-        contacts_of_lane,
-        contact_steps,
-        lane_impacts,
-        several_contacts,
-    )
-    step = of_several if several else (one_contact,)
-    common = (memory_layout, kernel_layout, lane_layout, contact_side, load_tables, lane_steps, meeting, sampling)
+    step = (contact_layout, lane_impacts, contacts_step) if several else (lane_step,)
+    common = (memory_layout, kernel_layout, memory, sides, load_tables, lane_steps, gap_roots, sampling)
     return _text(several, *common, *step, forcing_periods, driver)
 
 
 def _text(several: bool, *modules: ModuleType) -> str:
     """One source of the compiled parts of several files, for vectors of this machine's width."""
-    types = "from saltus.flow.lanes.contact_function_types import *\n" if several else ""
-    return _SIGNATURES + types + "".join(compiled_part(module) for module in modules)
+    header = _SIGNATURES + (_OF_CONTACTS if several else "")
+    return header + "".join(compiled_part(module) for module in modules)
 
 
 @cache
@@ -116,21 +106,21 @@ def compile_driver_aside(several: bool) -> subprocess.Popen[bytes] | None:
 
 @cache
 def load_helpers(several: bool = False) -> tuple[Any, ...]:
-    """The functions that the driver calls for one lane: `lane_root`, `turning_range`, `scalar_motion`; with several contacts also
-    `contacts_impact`."""
-    names = ["lane_root", "turning_range", "scalar_motion"]
-    parts = [kernel_layout, lane_layout, load_tables, roots, steps, scalar_fallback, lane_state]
+    """The functions that the driver calls for one lane, in the order of `Helpers`."""
+    names = ["first_root_of", "turning_range", "scalar_motion"]
+    parts = [memory_layout, kernel_layout, memory, load_tables, roots]
     if several:
         names.append("contacts_impact")
-        parts += [contact_layout, complementarity, contact_impacts, contacts_of_lane, contacts_handoff]
+        parts += [steps, contact_layout, solver_memory, complementarity, contact_impacts, lane_impacts, lane_handoff]
+        parts += [handoff, scalar_impact]
     else:
-        parts.append(scalar_handoff)
+        parts += [one_contact_handoff, handoff]
     module = load_module("lane_helpers", _text(several, *parts))
     return tuple(pointer(getattr(module, name)) for name in names)
 
 
-def load_lane_functions(trace: Trace) -> tuple[Slots, tuple[Any, ...]]:
-    """The memory layout of a structure and its functions for lanes.
+def load_lane_functions(trace: Trace) -> tuple[MemoryPlan, tuple[Any, ...]]:
+    """The memory that a structure needs, and its functions for lanes.
 
     Raises
     ------
@@ -138,13 +128,13 @@ def load_lane_functions(trace: Trace) -> tuple[Slots, tuple[Any, ...]]:
         Compiling them would take minutes.
     """
     check_size(trace, lanes=True)
-    return slots_of(trace), tuple(load_functions("lane", lane_functions(trace)).values())
+    return memory_plan(trace), tuple(load_functions("lane", lane_functions(trace)).values())
 
 
 @cache
 def load_advance(several: bool = False) -> Any:
     """The scalar kernel, which the driver calls for one lane."""
-    return pointer((contacts_module() if several else kernel_module()).advance)
+    return pointer(contacts_module().advance if several else kernel_module().advance)
 
 
 def compile_everything(several: bool = False) -> None:

@@ -1,7 +1,7 @@
 """A group of lanes that moves many trajectories at once. Each lane has its own time, step, side and parameters, and takes the
 next trajectory when its own has ended.
 
-The compiled parts of `kernel/layout.py`, `lane_layout.py`, `one_contact/sides.py`, `lane_steps.py`, `meeting.py`, `sampling.py`,
+The compiled parts of `kernel/layout.py`, `memory.py`, `one_contact/sides.py`, `lane_steps.py`, `gap_roots.py`, `sampling.py`,
 `one_contact/lane_step.py`, `forcing_periods.py` and this file are one module, compiled once for all models, for the width of
 this machine's registers. The functions of a structure, `code`, come through pointers. For models with several contacts there is
 a second module with `contacts/lane_step.py` in the place of `one_contact/lane_step.py`.
@@ -16,142 +16,127 @@ A step may go past the end of a forcing period. The state there is then evaluate
 and the next period begins: for all lanes at once (`begin_together`), or lane by lane where the end of the period has further
 consequences (`forcing_periods.arrive`).
 
-`m` is the lanes' memory, in slots of one vector (`lane_layout.py`). `jobs` and `results` are arrays with a row for each
-trajectory. `space` begins with room for two polynomials of one lane.
+`lanes` is the group with all of its memory, and `lane` one of its lanes (`memory.py`).
 """
 
 from __future__ import annotations
 
-import numpy as np
-
-from saltus.flow.kernel.layout import ROUGHER, Mode, Status
-from saltus.flow.kernel.memory_layout import LanePart
-from saltus.flow.lanes.forcing_periods import arrive, fill, finish, unresolved
-from saltus.flow.lanes.function_types import RUN_LANES
-from saltus.flow.lanes.lane_layout import (
-    Flag,
-    Helper,
-    JobArray,
-    LaneArray,
-    LaneLabel,
-    LaneSetting,
-    Size,
-    Slot,
-)
-from saltus.flow.lanes.lane_steps import step_limits
-from saltus.flow.one_contact.lane_step import lane_arrays, lane_space, step_all
+from saltus.flow.kernel.layout import Mode, Status
+from saltus.flow.lanes.forcing_periods import arrive, fill, finish, records_of, unresolved
+from saltus.flow.lanes.function_types import RUN_LANES, shared
+from saltus.flow.one_contact.lane_step import step_all
 from saltus.taylor import (
     ALL,
     WIDTH,
     anchor,
     bits,
-    by_reference,
     cached_jit,
     expand_record,
     first_lane,
-    get,
     inline_jit,
     lane_count,
     lean_jit,
-    load,
     mask,
-    own_records,
-    put,
-    replace,
+    one,
+    select,
 )
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
 
 @lean_jit
-def expand_records(sizes, at, m, flags, lanes, tables, row):
+def expand_records(lanes):
     """The records' polynomials of every lane, expanded at its time."""
-    labels = lanes[LaneArray.LABELS]
-    for lane in range(WIDTH):
-        if (flags[Flag.BUSY] >> lane) & 1:
-            breaks, table = own_records(tables, labels[lane, LaneLabel.TRAJECTORY])
-            piece, t = labels[lane, LaneLabel.PIECE], get(m, Slot.NOW, lane) + get(m, Slot.ORIGIN, lane)
-            for r in range(sizes[Size.RECORDS]):
+    row = lanes.polynomial
+    for i in range(WIDTH):
+        if (lanes.busy >> i) & 1:
+            lane = one(lanes, i)
+            breaks, table = records_of(lane, lane.trajectory)
+            piece, t = lane.piece, lane.now + lane.origin
+            for r in range(lane.sizes.records):
                 expand_record(table[r, piece], anchor(breaks, piece), t, row)
                 for k in range(table.shape[2]):
-                    put(m, at[LanePart.RECORDS] + r * table.shape[2] + k, lane, row[k])
+                    lane.records[r * table.shape[2] + k] = row[k]
 
 
 @inline_jit
-def begin_together(m, free):
+def begin_together(lanes, free):
     """Begin the next forcing period in lanes whose step went past the end of one, if the next one is as long (compare
     `forcing_periods.arrive`)."""
     going = mask(free)
-    begin, end, period = load(m, Slot.PERIOD_START), load(m, Slot.PERIOD_END), load(m, Slot.PERIOD) + 1.0
-    replace(m, Slot.NOW, going, begin + (load(m, Slot.NOW) - end))
-    replace(m, Slot.LAST_CHECK, going, load(m, Slot.LAST_CHECK) + (begin - end))
-    replace(m, Slot.PERIODS_DONE, going, load(m, Slot.PERIODS_DONE) + 1.0)
-    replace(m, Slot.ORIGIN, going, period * load(m, Slot.PERIOD_LENGTH))
-    replace(m, Slot.PERIOD, going, period)
+    begin, end, period = lanes.period_start, lanes.period_end, lanes.period + 1.0
+    lanes.now = select(going, begin + (lanes.now - end), lanes.now)
+    lanes.last_check = select(going, lanes.last_check + (begin - end), lanes.last_check)
+    lanes.periods_done = select(going, lanes.periods_done + 1.0, lanes.periods_done)
+    lanes.origin = select(going, period * lanes.period_length, lanes.origin)
+    lanes.period = select(going, period, lanes.period)
 
 
 @lean_jit
-def run_with(
-    code_of, scalar, helpers_of, sizes, at, settings, m, jobs_of, tables_of, results_of, control, limits, flags, arrays, room
-):
-    """`run_lanes` with the arrays of `LaneArray`, and room."""
-    code, helpers, jobs, tables = by_reference(code_of), by_reference(helpers_of), by_reference(jobs_of), by_reference(tables_of)
-    results, lanes, space = by_reference(results_of), by_reference(arrays), by_reference(room)
-    count, following = jobs[JobArray.STATES].shape[0], 0
+def fill_all(lanes, following):
+    """Put trajectories into all lanes that are free, from number `following` on; returns the number of the next one."""
+    while lanes.busy != ALL and following < lanes.work.jobs.size:
+        lane = one(lanes, first_lane(~lanes.busy))
+        fill(lane, following)
+        following += 1
+        if lane.mode == Mode.BEYOND:
+            finish(lane, Status.OUTSIDE, 0)
+    return following
+
+
+@inline_jit
+def go_on(lane, away, captured, checked, past):
+    """Go on in one lane after a step of all lanes; the arguments say whether the scalar kernel moves it, whether it is captured,
+    whether its number of impacts is checked, and whether the step went past the end of its forcing period."""
+    status, detail, control = Status.PAUSED, 0, lane.work.control
+    # This check comes first, as lanes with slow impacts need the scalar kernel in every step.
+    if checked and unresolved(lane):
+        status = Status.UNRESOLVED
+    elif away:
+        scalar_motion = lane.helpers.scalar_motion
+        status, detail = scalar_motion(lane)
+    if status == Status.PAUSED and lane.now >= lane.period_end:
+        before = lane.periods_done
+        status, detail = arrive(lane, past)
+        control[1] += int(lane.periods_done - before)
+    if status == Status.PAUSED and captured:
+        status = Status.CAPTURED
+    if status != Status.PAUSED:
+        finish(lane, status, detail)
+
+
+@lean_jit
+def run_all(lanes):
+    """Run all jobs of a group."""
+    following, control = 0, lanes.work.control
     while True:
-        while flags[Flag.BUSY] != ALL and following < count:
-            lane = first_lane(~flags[Flag.BUSY])
-            fill(lane, following, code, sizes, at, m, flags, lanes, jobs, tables)
-            following += 1
-            if lanes[LaneArray.LABELS][lane, LaneLabel.MODE] == Mode.BEYOND:
-                finish(lane, Status.OUTSIDE, 0, code, sizes, at, m, flags, lanes, results)
-        if flags[Flag.BUSY] == 0 or control[0] != 0:
+        following = fill_all(lanes, following)
+        if lanes.busy == 0 or control[0] != 0:
             return
         away, captured, checked, past = 0, 0, 0, 0
-        arrived = bits(load(m, Slot.NOW) >= load(m, Slot.PERIOD_END)) & flags[Flag.BUSY]
+        arrived = bits(lanes.now >= lanes.period_end) & lanes.busy
         if arrived == 0:
-            if sizes[Size.RECORDS] > 0:
-                expand_records(sizes, at, m, flags, lanes, tables, space[0])
-            away = flags[Flag.SCALAR]
-            if flags[Flag.BUSY] != flags[Flag.SCALAR]:
-                doubtful, captured, past = step_all(
-                    code, scalar, sizes, at, m, flags, settings, limits, helpers, lanes, jobs, tables, space
-                )
+            if lanes.sizes.records > 0:
+                expand_records(lanes)
+            away = lanes.scalar
+            if lanes.busy != lanes.scalar:
+                doubtful, captured, past = step_all(lanes)
                 away |= doubtful
-                free = past & bits(load(m, Slot.PERIOD) < load(m, Slot.PASSED_TOGETHER))
+                free = past & bits(lanes.period < lanes.passed_together)
                 if free:
-                    begin_together(m, free)
+                    begin_together(lanes, free)
                     control[1] += lane_count(free)
                     past &= ~free
-            checked = bits(load(m, Slot.IMPACTS) > load(m, Slot.NEXT_CHECK)) & flags[Flag.BUSY] & ~past
-            arrived = bits(load(m, Slot.NOW) >= load(m, Slot.PERIOD_END)) & flags[Flag.BUSY]
+            checked = bits(lanes.impacts > lanes.next_check) & lanes.busy & ~past
+            arrived = bits(lanes.now >= lanes.period_end) & lanes.busy
         concerned = away | captured | checked | arrived
         while concerned:
-            lane = first_lane(concerned)
+            i = first_lane(concerned)
             concerned &= concerned - 1
-            status, detail = Status.PAUSED, 0
-            # This check comes first, as lanes with slow impacts need the scalar kernel in every step.
-            if (checked >> lane) & 1 and unresolved(lane, sizes, m):
-                status = Status.UNRESOLVED
-            elif (away >> lane) & 1:
-                scalar_motion, parameters = helpers[Helper.SCALAR_MOTION], jobs[JobArray.PARAMETERS]
-                status, detail = scalar_motion(
-                    lane, scalar, sizes, at, m, flags, settings, lanes, parameters, tables, space[0], control
-                )
-            if status == Status.PAUSED and get(m, Slot.NOW, lane) >= get(m, Slot.PERIOD_END, lane):
-                before = get(m, Slot.PERIODS_DONE, lane)
-                status, detail = arrive(lane, (past >> lane) & 1, sizes, at, m, lanes, tables, results)
-                control[1] += int(get(m, Slot.PERIODS_DONE, lane) - before)
-            if status == Status.PAUSED and (captured >> lane) & 1:
-                status = Status.CAPTURED
-            if status != Status.PAUSED:
-                finish(lane, status, detail, code, sizes, at, m, flags, lanes, results)
+            go_on(one(lanes, i), away >> i & 1, captured >> i & 1, checked >> i & 1, past >> i & 1)
 
 
 @cached_jit(RUN_LANES, nogil=True)
-def run_lanes(code, scalar, helpers, sizes, at, settings, m, jobs, tables, results, control):
-    """Run all jobs. `control` = [whether to stop, forcing periods done so far]."""
-    tol = settings[LaneSetting.TOLERANCE]
-    limits = step_limits(sizes[Size.ORDER], tol), step_limits(sizes[Size.ORDER], ROUGHER * tol)
-    lanes, flags, space = lane_arrays(sizes, at), np.zeros(3, dtype=np.int64), lane_space(sizes, at)
-    run_with(code, scalar, helpers, sizes, at, settings, m, jobs, tables, results, control, limits, flags, lanes, space)
+def run_lanes(group):
+    """Run all jobs of a group, a tuple `Group` (`memory.py`)."""
+    run_all(shared(group))

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from saltus.checks import check_memory, check_number, check_work
+from saltus.flow.kernel.layout import Mode, Status
 from saltus.flow.kernel.structures import Program, limits_of, program
 from saltus.flow.lanes.capture_speeds import capture_speeds
-from saltus.flow.lanes.compiled_lanes import compile_beside, compile_driver_aside, load_lane_functions
+from saltus.flow.lanes.compiled_lanes import compile_beside, compile_driver_aside, compile_everything, load_lane_functions
 from saltus.flow.lanes.ensemble_dataset import to_dataset
 from saltus.flow.lanes.ensemble_result import EnsembleResult
 from saltus.flow.lanes.inputs import Inputs, read_inputs
-from saltus.flow.lanes.lane_layout import JobLabel, JobNumber
+from saltus.flow.lanes.memory import JOB
+from saltus.flow.lanes.options import EnsembleOptions, Sample, Until, read_last, read_names, read_side, read_threads
 from saltus.flow.lanes.threads import Jobs, Lanes
-from saltus.flow.lanes.wanted import Sample, Until, Wanted, read_last, read_names, read_side, read_threads
 from saltus.flow.motion.forcing_time import Clock, clock
 from saltus.progress import Progress, silent
 from saltus.public_functions import Numbers
@@ -97,7 +98,7 @@ def simulate_many(
     """
     check_system(system, "simulate_many", several_contacts=True)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
-    wanted = Wanted(
+    options = EnsembleOptions(
         tol=tol,
         periods=periods,
         limits=limits_of(system, stop_at),
@@ -107,13 +108,13 @@ def simulate_many(
     )
     side, threads = read_side(side), read_threads(threads)
     inputs = read_inputs(system, velocity, time, parameters, coordinates)
-    return to_dataset(run_ensemble(system, inputs, wanted, threads, progress, duration=duration, side=side, last=last))
+    return to_dataset(run_ensemble(system, inputs, options, threads, progress, duration=duration, side=side, last=last))
 
 
 def run_ensemble(
     system: System,
     inputs: Inputs,
-    wanted: Wanted,
+    options: EnsembleOptions,
     threads: int,
     progress: Progress,
     *,
@@ -124,40 +125,40 @@ def run_ensemble(
 ) -> EnsembleResult:
     """Compile the code that is not there yet, and run the trajectories; `captured` holds speeds of capture that are known."""
     driver = compile_driver_aside(system.model.holds_coordinates)
-    run = program(system, wanted.limits, wanted.paths)
-    jobs = _jobs(system, run, inputs, wanted.periods, duration, side)
-    if Until.REST in wanted.until:
-        jobs.numbers[:, JobNumber.CAPTURE_SPEED] = capture_speeds(system, inputs.parameters, wanted.limits, known=captured)
-    spans = jobs.labels[:, JobLabel.LAST_PERIOD] - jobs.labels[:, JobLabel.FIRST_PERIOD]
-    begun = jobs.numbers[:, JobNumber.END_TIME] > jobs.numbers[:, JobNumber.START_TIME]
+    run = program(system, options.limits, options.paths)
+    jobs = _jobs(system, run, inputs, options.periods, duration, side)
+    if Until.REST in options.until:
+        jobs.rows["capture_speed"] = capture_speeds(system, inputs.parameters, options.limits, known=captured)
+    spans = jobs.rows["last_period"] - jobs.rows["first_period"]
+    begun = jobs.rows["end_time"] > jobs.rows["start_time"]
     check_work("periods" if duration is None else "duration", inputs.size, float(np.max(spans, initial=0)))
     kept = read_last(last, int(np.max(spans + begun, initial=1)))
-    check_memory("last", 16.0 * len(wanted.sample) * kept * inputs.size, f"samples of {kept} periods of {inputs.size} motions")
-    lanes = compiled_lanes(system, run, wanted, kept)
+    check_memory("last", 16.0 * len(options.sample) * kept * inputs.size, f"samples of {kept} periods of {inputs.size} motions")
+    lanes = compiled_lanes(system, run, options, kept)
     if driver is not None:
         compile_beside(driver, system.model.holds_coordinates)
     ends = lanes.run(jobs, threads, progress, total=float(np.sum(spans + 1)))
-    return EnsembleResult(system, inputs, wanted, jobs, ends)
+    return EnsembleResult(system, inputs, options, jobs, ends)
 
 
-def compiled_lanes(system: System, run: Program, wanted: Wanted, kept: int) -> Lanes:
+def compiled_lanes(system: System, run: Program, options: EnsembleOptions, kept: int) -> Lanes:
     """The compiled lanes of a system, with the settings for the samples that they keep of each trajectory."""
     key = run.structure.functions  # their addresses
     if key not in _functions:
         _functions[key] = load_lane_functions(run.trace)
-    slots, functions = _functions[key]
+    plan, functions = _functions[key]
     own = len(system.model.coordinates)
     return Lanes(
         program=run,
-        slots=slots,
+        plan=plan,
         functions=functions,
         parameters=run.env[0] if run.trace.several else np.array([value for _, value in numbers(system)] or [0.0]),
-        tol=wanted.tol,
-        kept=kept if wanted.sample else 1,
-        sampled=[column for kind in Sample if kind in wanted.sample for column in kind.columns(own)],
-        extrema=Sample.EXTREMA in wanted.sample,
-        from_start=wanted.from_start,
-        settle=Until.SETTLED in wanted.until,
+        tol=options.tol,
+        kept=kept if options.sample else 1,
+        sampled=[column for kind in Sample if kind in options.sample for column in kind.columns(own)],
+        extrema=Sample.EXTREMA in options.sample,
+        from_start=options.from_start,
+        settle=Until.SETTLED in options.until,
     )
 
 
@@ -169,17 +170,16 @@ def _jobs(system: System, run: Program, inputs: Inputs, periods: float | None, d
     known = [path for path, _ in numbers(system)]
     columns = {known.index(path): np.broadcast_to(a, inputs.size) for path, a in inputs.parameters.items()}
     states = _first_states(inputs, len(system.model.coordinates), run.structure.sizes.columns)
-    numbers_of, labels = np.zeros((inputs.size, len(JobNumber))), np.zeros((inputs.size, len(JobLabel)), dtype=np.int64)
+    rows = np.zeros(inputs.size, dtype=JOB)
     time, frequency = inputs.values["time"], inputs.values.get("load.frequency", system.load.frequency)
     length = None if frequency is None else 2.0 * math.pi / np.asarray(frequency, dtype=float)
     at = clock(time, length, periods, duration)
     last, end = _from_the_start(at)
-    numbers_of[:, JobNumber.START_TIME], numbers_of[:, JobNumber.PERIOD_LENGTH] = at.local, at.length
-    numbers_of[:, JobNumber.END_TIME] = end
-    labels[:, JobLabel.FIRST_PERIOD], labels[:, JobLabel.LAST_PERIOD], labels[:, JobLabel.LEAVE_BY] = at.first, last, side
+    rows["start_time"], rows["period_length"], rows["end_time"] = at.local, at.length, end
+    rows["first_period"], rows["last_period"], rows["leave_by"] = at.first, last, side
     records = record_tables(system, run.trace.records, inputs.parameters)
-    labels[:, JobLabel.PIECE] = np.count_nonzero(records[0] <= np.reshape(time, (-1, 1)), axis=1)
-    return Jobs(states, numbers_of, labels, columns, records)
+    rows["piece"] = np.count_nonzero(records[0] <= np.reshape(time, (-1, 1)), axis=1)
+    return Jobs(states, rows, columns, records)
 
 
 def _from_the_start(at: Clock) -> tuple[Any, Any]:
@@ -202,3 +202,36 @@ def _first_states(inputs: Inputs, own: int, columns: int) -> np.ndarray:
     for j in range(min(columns, 2 * own)):  # the derivatives of the initial state to itself
         states[:, own + j * own + j % own + rows * (j // own)] = 1.0
     return states
+
+
+class Advanced(NamedTuple):
+    """Motions at the end of a span."""
+
+    states: np.ndarray  # (n, 6), as `TangentEnsemble.advance` takes them
+    sound: np.ndarray  # (n,): whether the motion came to the end with a known phase, and all numbers are finite
+
+
+class TangentEnsemble:
+    """Motions of a system with one coordinate, each with parameters and a forcing period of its own."""
+
+    def __init__(self, system: System, parameters: Mapping[str, np.ndarray], lengths: np.ndarray, tol: float) -> None:
+        limits, places = limits_of(system, ()), list(system.parameters)
+        options = EnsembleOptions(tol=tol, periods=None, limits=limits, sample=(), until=(), paths=())
+        run = program(system, limits, ())
+        self._lanes = compiled_lanes(system, run, options, 1)
+        self._columns = {places.index(path): values for path, values in parameters.items()}
+        self._lengths, self.held = lengths, system.model.holds_coordinates
+        self._records = record_tables(system, run.trace.records, {})
+        compile_everything(self.held)  # here, not in each thread that advances some of the motions
+
+    def advance(self, rows: np.ndarray, states: np.ndarray, begin: np.ndarray, end: np.ndarray) -> Advanced:
+        """Advance the motions of these numbers between two local times of a forcing period, (n,) each, on this thread.
+
+        A state holds coordinate, its two derivatives, velocity, its two: (n, 6).
+        """
+        jobs = np.zeros(rows.size, dtype=JOB)
+        jobs["start_time"], jobs["end_time"], jobs["period_length"] = begin, end, self._lengths[rows]
+        columns = {c: values[rows] for c, values in self._columns.items()}
+        ends = self._lanes.run(Jobs(states, jobs, columns, self._records), 1)
+        done = (ends.rows["status"] == Status.DONE) & (ends.rows["mode"] != Mode.CHATTER)
+        return Advanced(ends.states, done & np.isfinite(ends.states).all(axis=1))

@@ -1,4 +1,4 @@
-"""An ensemble as an xarray Dataset, with units and provenance."""
+"""An ensemble as an xarray Dataset, with units and provenance; and what is read from it again."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.checks import check_dataset
 from saltus.flow.kernel.layout import Status
-from saltus.flow.lanes.lane_layout import EndLabel, EndNumber
-from saltus.flow.lanes.wanted import Sample, Until
+from saltus.flow.lanes.options import Sample, Until
 from saltus.flow.motion.dataset import rate_name, state_names
 from saltus.flow.motion.stops import Stop
 from saltus.flow.motion.validity import GAIN_ROUNDING
 from saltus.provenance import provenance
+from saltus.public_functions import answered
 from saltus.systems import energy_gains, substitute
 
 if TYPE_CHECKING:
@@ -72,10 +73,10 @@ def to_dataset(result: EnsembleResult) -> xarray.Dataset:
     if system.model.contacts:
         _add_gains(writer, system, inputs)
     _add_samples(writer, result)
-    if result.wanted.paths is not None:
-        _add_derivatives(writer, result, result.wanted.paths)
+    if result.options.paths is not None:
+        _add_derivatives(writer, result, result.options.paths)
     known: dict[str, Any] = {"kind": "ensemble", "Conventions": "CF-1.8"}
-    attributes = {"title": "ensemble computed by saltus"} | provenance(system, tol=result.wanted.tol, **known)
+    attributes = {"title": "ensemble computed by saltus"} | provenance(system, tol=result.options.tol, **known)
     attributes |= _add_inputs(writer, inputs)
     return xarray.Dataset(writer.variables, writer.coords, attributes)
 
@@ -109,15 +110,15 @@ def _add_ends(writer: _Writer, result: EnsembleResult) -> None:
     writer.add("time", result.time, "1", "dimensionless time tau at the end")
     names = [contact.name for contact in result.system.model.contacts]
     if names:
-        closed = (ends.of(EndLabel.SIDE) - 1).astype(np.int16)
+        closed = (ends.rows["side"] - 1).astype(np.int16)
         writer.add("closed_contacts", closed, "1", "contacts that are closed at the end", **_masks(names))
     writer.add("side", result.side.astype(np.int8), "1", "side at the end, 0 at rest")
-    writer.add("impact_count", ends.of(EndLabel.IMPACTS), "1", "impacts")
-    writer.add("grazings", ends.of(EndLabel.GRAZINGS), "1", "touches of the contact without an impact")
+    writer.add("impact_count", ends.rows["impacts"], "1", "impacts")
+    writer.add("grazings", ends.rows["grazings"], "1", "touches of the contact without an impact")
     if result.periods is not None:
         writer.add("periods", result.periods, "1", "forcing periods from the start to the end")
     text = "speed of the gap after impacts too small to be followed, else 0"
-    writer.add("chatter_speed", ends.numbers[:, EndNumber.CHATTER_SPEED], "1", text)
+    writer.add("chatter_speed", ends.rows["chatter_speed"], "1", text)
 
 
 def _masks(names: list[str]) -> dict[str, Any]:
@@ -158,13 +159,13 @@ def _is_coordinate(name: str, values: np.ndarray, inputs: Inputs) -> bool:
 
 def _add_stops(writer: _Writer, result: EnsembleResult) -> None:
     """Why each trajectory ended."""
-    members, wanted, ends = tuple(Stop), result.wanted, result.ends
+    members, options, ends = tuple(Stop), result.options, result.ends
     comment = "; ".join(f"{stop}: {stop.meaning}" for stop in members)
     writer.add("stop", result.stops, "1", "why it ended", **_flags(members), comment=comment)
-    if wanted.limits:
-        which = np.where(ends.of(EndLabel.STATUS) == Status.LIMITED, ends.of(EndLabel.DETAIL), -1).astype(np.int8)
-        writer.add("limit", which, "1", "the margin that ended it, -1 for none", **_flags(wanted.limits))
-    if Until.SETTLED in wanted.until:
+    if options.limits:
+        which = np.where(ends.rows["status"] == Status.LIMITED, ends.rows["detail"], -1).astype(np.int8)
+        writer.add("limit", which, "1", "the margin that ended it, -1 for none", **_flags(options.limits))
+    if Until.SETTLED in options.until:
         text = "forcing periods after which it repeats itself, 0 where it has not settled"
         writer.add("recurrence_period", result.recurrence_period, "1", text)
 
@@ -176,7 +177,7 @@ def _flags(names: tuple[str, ...]) -> dict[str, Any]:
 
 def _add_samples(writer: _Writer, result: EnsembleResult) -> None:
     """Add the samples of the last forcing periods, and the extrema and least speeds of the whole motions."""
-    first, extrema, sample, numbers = writer.names[0], extrema_names(writer.names), result.wanted.sample, result.ends.numbers
+    first, extrema, sample, rows = writer.names[0], extrema_names(writer.names), result.options.sample, result.ends.rows
     slowest = "the least speed before an impact, inf without impacts"
     unit = writer.units[first]
     meant = [f"the {which} {first if len(writer.names) == 1 else 'of all coordinates'}" for which in ("largest", "smallest")]
@@ -192,10 +193,10 @@ def _add_samples(writer: _Writer, result: EnsembleResult) -> None:
         for column, (variable, its_unit, text) in enumerate(variables[kind]):
             writer.add(variable, np.ascontiguousarray(values[:, :, column]), its_unit, text, "period")
     if Sample.EXTREMA in sample:
-        for i, (name, text) in enumerate(zip(extrema, meant, strict=True)):
-            writer.add(f"overall_{name}", numbers[:, EndNumber.HIGHEST + i], unit, f"{text} from the start to the end")
+        for name, text, field in zip(extrema, meant, ("highest", "lowest"), strict=True):
+            writer.add(f"overall_{name}", rows[field], unit, f"{text} from the start to the end")
     if Sample.SPEED in sample:
-        writer.add("overall_least_speed", numbers[:, EndNumber.LEAST_SPEED], unit, f"{slowest}, from the start to the end")
+        writer.add("overall_least_speed", rows["least_speed"], unit, f"{slowest}, from the start to the end")
 
 
 def _add_derivatives(writer: _Writer, result: EnsembleResult, paths: tuple[str, ...]) -> None:
@@ -203,3 +204,50 @@ def _add_derivatives(writer: _Writer, result: EnsembleResult, paths: tuple[str, 
     states = [*writer.names, *writer.rates]
     writer.coords |= {"state": ("state", states), "column": ("column", [*states, *paths])}
     writer.add("derivative", result.derivatives, "1", "derivative of the state at the end", "state", "column")
+
+
+# --- reading ----------------------------------------------------------------------------------------------------------------
+
+
+@answered
+def stop_names(dataset: xarray.Dataset) -> np.ndarray[Any, Any]:
+    """Why each motion ended, in the dimensions of the ensemble; the words are those of `Stop`.
+
+    Parameters
+    ----------
+    dataset
+        The dataset that `simulate_many` gave.
+
+    Examples
+    --------
+    >>> ends = saltus.simulate_many(system, theta=[0.1, 0.2], periods=2)
+    >>> saltus.flow.stop_names(ends)
+    array(['horizon', 'horizon'], dtype='<U10')
+    """
+    check_dataset(dataset, "simulate_many", ("stop",))
+    stop = dataset["stop"]
+    return np.asarray(np.array(stop.attrs["flag_meanings"].split())[stop.values])
+
+
+@answered
+def stroboscopic(system: System, dataset: xarray.Dataset) -> np.ndarray[Any, Any]:
+    """The states (coordinates, then velocities) at the ends of the forcing periods that were kept, in the order of time.
+
+    The shape is that of the ensemble, then (periods, d); states are nan where a motion had fewer periods than were kept.
+
+    Parameters
+    ----------
+    system
+        What moved.
+    dataset
+        The dataset that `simulate_many` gave, with "state" among its samples.
+
+    Examples
+    --------
+    >>> ends = saltus.simulate_many(system, theta=[0.1, 0.2], periods=4, last=3)
+    >>> saltus.flow.stroboscopic(system, ends).shape
+    (2, 3, 2)
+    """
+    states = state_names(system.model.coordinates)
+    check_dataset(dataset, "simulate_many with sample", [f"sampled_{name}" for name in states])
+    return np.stack([dataset[f"sampled_{name}"].values for name in states], axis=-1)

@@ -9,9 +9,8 @@ import numpy as np
 
 from saltus.flow.kernel.layout import Mode, Status
 from saltus.flow.lanes.inputs import Inputs
-from saltus.flow.lanes.lane_layout import EndLabel, EndNumber, JobLabel, JobNumber
+from saltus.flow.lanes.options import EnsembleOptions, Sample
 from saltus.flow.lanes.threads import Ends, Jobs
-from saltus.flow.lanes.wanted import Sample, Wanted
 from saltus.flow.motion.stops import Stop
 from saltus.systems import System
 from saltus.taylor import FREQUENCY
@@ -37,7 +36,7 @@ class EnsembleResult:
 
     system: System
     inputs: Inputs
-    wanted: Wanted
+    options: EnsembleOptions
     jobs: Jobs
     ends: Ends
 
@@ -55,45 +54,45 @@ class EnsembleResult:
     @property
     def held(self) -> np.ndarray:
         """Which trajectories are held at the contact at the end, at rest or in chatter, (n,)."""
-        mode = self.ends.of(EndLabel.MODE)
+        mode = self.ends.rows["mode"]
         return np.asarray((mode == Mode.REST) | (mode == Mode.CHATTER))
 
     @property
     def side(self) -> np.ndarray:
         """The side of the contact at the end, 0 at rest; with several contacts 1 if the motion is not at rest, (n,)."""
-        side = self.ends.of(EndLabel.SIDE)
+        side = self.ends.rows["side"]
         return np.where(self.held, 0, np.ones_like(side) if self.system.model.contacts else side)
 
     @property
     def time(self) -> np.ndarray:
         """The dimensionless time at the end, (n,)."""
-        length, local = self.jobs.numbers[:, JobNumber.PERIOD_LENGTH], self.ends.numbers[:, EndNumber.TIME]
-        return np.asarray(self.ends.of(EndLabel.PERIOD) * length + local)
+        length, local = self.jobs.rows["period_length"], self.ends.rows["time"]
+        return np.asarray(self.ends.rows["period"] * length + local)
 
     @property
     def elapsed(self) -> np.ndarray:
         """The time from the start to the end, counted within their forcing periods, (n,)."""
-        return np.asarray(self.ends.numbers[:, EndNumber.TIME] - self.jobs.numbers[:, JobNumber.START_TIME])
+        return np.asarray(self.ends.rows["time"] - self.jobs.rows["start_time"])
 
     @property
     def whole_periods(self) -> np.ndarray:
         """The number of the forcing period in which a trajectory ended less that in which it began, (n,)."""
-        return np.asarray(self.ends.of(EndLabel.PERIOD) - self.jobs.labels[:, JobLabel.FIRST_PERIOD])
+        return np.asarray(self.ends.rows["period"] - self.jobs.rows["first_period"])
 
     @property
     def periods(self) -> np.ndarray | None:
         """The forcing periods from the start to the end, (n,); None without a forcing."""
-        length = self.jobs.numbers[:, JobNumber.PERIOD_LENGTH]
+        length = self.jobs.rows["period_length"]
         return self.whole_periods + self.elapsed / length if (length > 0).all() else None
 
     @cached_property
     def stops(self) -> np.ndarray:
         """Why each ended, the number of a `Stop`, (n,)."""
-        reasons = self.ends.of(EndLabel.STATUS)
+        reasons = self.ends.rows["status"]
         numbers = np.full(reasons.shape, -1, dtype=np.int8)
         for reason, stop in STOPS.items():
             numbers[reasons == reason] = NUMBERS[stop]
-        numbers[(reasons == Status.DONE) & (self.ends.of(EndLabel.MODE) == Mode.REST)] = NUMBERS[Stop.REST]
+        numbers[(reasons == Status.DONE) & (self.ends.rows["mode"] == Mode.REST)] = NUMBERS[Stop.REST]
         if self.system.model.singularity:  # steps that shrink to nothing mean a singularity that the model names
             numbers[reasons == Status.STALLED] = NUMBERS[Stop.SINGULAR]
         return numbers
@@ -105,17 +104,17 @@ class EnsembleResult:
     @property
     def recurrence_period(self) -> np.ndarray:
         """The forcing periods after which each repeats itself, 0 where it has not settled, (n,)."""
-        return np.where(self.ends.of(EndLabel.STATUS) == Status.SETTLED, self.ends.of(EndLabel.DETAIL), 0)
+        return np.where(self.ends.rows["status"] == Status.SETTLED, self.ends.rows["detail"], 0)
 
     @cached_property
     def samples(self) -> dict[Sample, np.ndarray]:
         """The samples of the last forcing periods, in the order of time, (n, kept, columns); nan where there were fewer."""
-        kept, done = self.ends.samples.shape[1], self.ends.of(EndLabel.PERIODS_DONE)
+        kept, done = self.ends.samples.shape[1], self.ends.rows["periods_done"]
         order = (done[:, None] + np.arange(kept)) % kept  # the oldest first
         samples = np.take_along_axis(self.ends.samples, order[:, :, None], axis=1)
         samples[np.arange(kept)[None, :] < (kept - done)[:, None]] = np.nan
         found, column = {}, 0
-        for kind in (kind for kind in Sample if kind in self.wanted.sample):
+        for kind in (kind for kind in Sample if kind in self.options.sample):
             width = len(kind.columns(len(self.system.model.coordinates)))
             found[kind] = samples[:, :, column : column + width]
             column += width
@@ -129,21 +128,21 @@ class EnsembleResult:
         motion ends after n of them, its end, start + n 2 pi / W, moves with the frequency W. If it ends at a margin, the end
         moves with the margin.
         """
-        paths = self.wanted.paths or ()
+        paths = self.options.paths or ()
         ends, own, rows = self.ends, len(self.system.model.coordinates), self.rows
         q = ends.states[:, own:rows].reshape(-1, 2 * own + len(paths), own)
         v = ends.states[:, rows + own :].reshape(-1, 2 * own + len(paths), own)
         derivatives = np.concatenate([q, v], axis=2).transpose(0, 2, 1).copy()
-        rates = ends.numbers[:, EndNumber.RATES : EndNumber.RATES + own]
-        shifts = ends.numbers[:, EndNumber.RATES + own :]
+        rates = ends.rates[:, :own]
+        shifts = ends.rates[:, own:]
         slope = np.concatenate([self.last[:, own:], rates], axis=1)
-        limited = ends.of(EndLabel.STATUS) == Status.LIMITED
+        limited = ends.rows["status"] == Status.LIMITED
         with np.errstate(invalid="ignore"):  # the instant at which a margin is reached without speed has no derivative
             derivatives[limited] += slope[limited, :, None] * shifts[limited, None, :]
-        if self.wanted.periods is not None and FREQUENCY in paths:
-            at_period_end = np.isin(ends.of(EndLabel.STATUS), (Status.DONE, Status.SETTLED))
-            moving = at_period_end & (ends.of(EndLabel.MODE) == Mode.ARC)
-            length = self.jobs.numbers[:, JobNumber.PERIOD_LENGTH]
+        if self.options.periods is not None and FREQUENCY in paths:
+            at_period_end = np.isin(ends.rows["status"], (Status.DONE, Status.SETTLED))
+            moving = at_period_end & (ends.rows["mode"] == Mode.ARC)
+            length = self.jobs.rows["period_length"]
             span = self.whole_periods * length + self.elapsed
             shift = np.where(moving, -span * length / (2.0 * np.pi), 0.0)  # of the end, -span / W
             derivatives[:, :, 2 * own + paths.index(FREQUENCY)] += np.where(moving[:, None], shift[:, None] * slope, 0.0)

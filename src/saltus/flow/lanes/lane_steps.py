@@ -10,21 +10,16 @@ import math
 import numpy as np
 
 from saltus.flow.kernel.layout import DEFECT, SMALLEST
-from saltus.flow.kernel.memory_layout import SERIES_LENGTH, LanePart
-from saltus.flow.lanes.lane_layout import Code, Size, Slot
 from saltus.taylor import (
     ALL,
-    WIDTH,
     absolute,
     bits,
     fma,
     inline_jit,
     lean_jit,
-    load,
     mask,
     maximum,
     minimum,
-    replace,
     rough_exp2,
     rough_inverse,
     rough_log2,
@@ -32,6 +27,15 @@ from saltus.taylor import (
     select,
     splat,
 )
+
+
+def step_limits(order: int, tol: float) -> tuple[float, float, float, tuple[float, float, float, float]]:
+    """Constants of `row_step`: log2 of tol; log2 of the factor by which the step from the last terms may exceed the one from the
+    upper half of a series, and this factor; and one over the orders of the last terms."""
+    log_tol = math.log2(tol)
+    rarely = -log_tol / order - LOG_GAP
+    return log_tol, rarely, 2.0**rarely, (1.0 / (order - 3), 1.0 / (order - 2), 1.0 / (order - 1), 1.0 / order)
+
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
@@ -41,66 +45,41 @@ LOG_GAP = 0.35 * math.log2(math.e)  # like `kernel_layout.GAP`, but for the last
 NEARLY = 1e-5  # of the time, and of the slope: after a shorter move the root is exact to rounding, as its cube is rounding
 
 
-@lean_jit
-def row_count(at):
-    """How many coordinates there are, those of the sensitivities included."""
-    return at[LanePart.VELOCITY] - at[LanePart.POSITION]
-
-
-@lean_jit
-def step_limits(order, tol):
-    """Constants of `row_step`: log2 of tol; log2 of the factor by which the step from the last terms may exceed the one from the
-    upper half of a series, and this factor; and one over the orders of the last terms.
-
-    They are computed once for a run, because a call of the C library in every step would put all registers into memory.
-    """
-    log_tol = math.log2(tol)
-    rarely = -log_tol / order - LOG_GAP
-    return log_tol, rarely, 2.0**rarely, (1.0 / (order - 3), 1.0 / (order - 2), 1.0 / (order - 1), 1.0 / order)
-
-
 @inline_jit
-def state_size(m, at, sizes):
+def state_size(lanes):
     """The largest coordinate or velocity."""
     size = splat(SMALLEST)
-    for row in range(sizes[Size.OWN]):
-        size = maximum(
-            size, maximum(absolute(load(m, at[LanePart.POSITION] + row)), absolute(load(m, at[LanePart.VELOCITY] + row)))
-        )
+    for row in range(lanes.sizes.own):
+        size = maximum(size, maximum(absolute(lanes.position[row]), absolute(lanes.velocity[row])))
     return size
 
 
 @inline_jit
-def natural_step(m, at, sizes, limits, size):
-    """The step that the series of all rows allow, including those of the tangent's columns, relative to the size of the state.
-
-    `limits` are the `step_limits` of the rows and of the columns.
-    """
-    rows = sizes[Size.OWN]
-    step = row_step(m, at[LanePart.VELOCITIES], sizes[Size.ORDER], size, limits[0])
+def natural_step(lanes, size):
+    """The step that the series of all rows allow, including those of the tangent's columns, relative to the size of the state."""
+    rows, limits = lanes.sizes.own, lanes.settings.limits
+    step = row_step(lanes.velocities[0], lanes.sizes.order, size, limits)
     for row in range(1, rows):
-        step = minimum(step, row_step(m, at[LanePart.VELOCITIES] + row * SERIES_LENGTH, sizes[Size.ORDER], size, limits[0]))
-    for first in range(rows, rows * (1 + sizes[Size.COLUMNS]), rows):
-        step = minimum(step, column_step(m, at, sizes, first, limits[1]))
+        step = minimum(step, row_step(lanes.velocities[row], lanes.sizes.order, size, limits))
+    for first in range(rows, lanes.sizes.rows, rows):
+        step = minimum(step, column_step(lanes, first))
     return step
 
 
 @lean_jit
-def column_step(m, at, sizes, first, limits):
+def column_step(lanes, first):
     """The step that the series of a column of the tangent allows, relative to its own size (`steps.column_step`)."""
     size, step = splat(ZERO_TERM), splat(np.inf)
-    for row in range(first, first + sizes[Size.OWN]):
-        size = maximum(
-            size, maximum(absolute(load(m, at[LanePart.POSITION] + row)), absolute(load(m, at[LanePart.VELOCITY] + row)))
-        )
-        size = maximum(size, absolute(load(m, at[LanePart.VELOCITIES] + row * SERIES_LENGTH + 1)))
-    for row in range(first, first + sizes[Size.OWN]):
-        step = minimum(step, row_step(m, at[LanePart.VELOCITIES] + row * SERIES_LENGTH, sizes[Size.ORDER], size, limits))
+    for row in range(first, first + lanes.sizes.own):
+        size = maximum(size, maximum(absolute(lanes.position[row]), absolute(lanes.velocity[row])))
+        size = maximum(size, absolute(lanes.velocities[row][1]))
+    for row in range(first, first + lanes.sizes.own):
+        step = minimum(step, row_step(lanes.velocities[row], lanes.sizes.order, size, lanes.settings.column_limits))
     return step
 
 
 @inline_jit
-def row_step(m, series, order, size, limits):
+def row_step(series, order, size, limits):
     """The step at which the largest of a series' last terms is tol, relative to `size`.
 
     If the last terms vanish, the growth of the series is taken from all terms of its upper half, as in `steps.step_size`.
@@ -109,80 +88,79 @@ def row_step(m, series, order, size, limits):
     wanted = log_tol + rough_log2(size)
     step = splat(500.0)
     for j in range(LAST_TERMS):
-        term = absolute(load(m, series + order - LAST_TERMS + 1 + j))
+        term = absolute(series[order - LAST_TERMS + 1 + j])
         step = minimum(step, (wanted - rough_log2(maximum(splat(ZERO_TERM), term))) * inverses[j])
     step = maximum(step, splat(-500.0))
     natural, half = rough_exp2(step), order // 2
-    reach, upper = natural * factor, absolute(load(m, series + order - LAST_TERMS))
+    reach, upper = natural * factor, absolute(series[order - LAST_TERMS])
     for k in range(order - LAST_TERMS - 1, half - 1, -1):
-        upper = fma(upper, reach, absolute(load(m, series + k)))
+        upper = fma(upper, reach, absolute(series[k]))
     vanishing = bits(rough_log2(upper) + half * (step + rarely) > wanted - log_tol + 1.0)
     if vanishing:
-        shorter = rough_exp2(upper_half(m, series, order, wanted - log_tol, log_tol))
+        shorter = rough_exp2(upper_half(series, order, wanted - log_tol, log_tol))
         natural = select(mask(vanishing), minimum(shorter, natural), natural)
     return natural
 
 
 @lean_jit
-def upper_half(m, series, order, log_size, log_tol):
+def upper_half(series, order, log_size, log_tol):
     """log2 of the step that the upper half of a series allows, without its last terms."""
     step = splat(500.0)
     for k in range(order // 2, order - LAST_TERMS + 1):
-        growth = (rough_log2(maximum(splat(ZERO_TERM), absolute(load(m, series + k)))) - log_size) * (1.0 / k)
+        growth = (rough_log2(maximum(splat(ZERO_TERM), absolute(series[k]))) - log_size) * (1.0 / k)
         step = minimum(step, log_tol / order - growth)
     return step
 
 
 @inline_jit
-def sweep(m, at, row, order, h):
+def sweep(lanes, row, h):
     """The mean velocity of a coordinate over [0, h], its velocity and acceleration at h, and B = h^2 sum_{j>=2} abs(a_j) h^j.
 
     From the mean velocity follow both the coordinate at h and its distance from a contact, each with all of its digits: one from
     the other would lose them where the contact is far away, or near. B bounds the difference between the second derivative in
     u = t/h and that of the cubic q_0 + ... + q_3 h^3 u^3.
     """
-    before = row * SERIES_LENGTH
-    positions, velocities = at[LanePart.POSITIONS] + before, at[LanePart.VELOCITIES] + before
-    accelerations = at[LanePart.ACCELERATIONS] + before
-    x, v, a = load(m, positions + order), load(m, velocities + order), load(m, accelerations + order - 1)
+    order, positions, velocities = lanes.sizes.order, lanes.positions[row], lanes.velocities[row]
+    accelerations = lanes.accelerations[row]
+    x, v, a = positions[order], velocities[order], accelerations[order - 1]
     bend = absolute(a)
-    x, v = fma(x, h, load(m, positions + order - 1)), fma(v, h, load(m, velocities + order - 1))
+    x, v = fma(x, h, positions[order - 1]), fma(v, h, velocities[order - 1])
     for k in range(order - 2, 1, -1):
-        coefficient = load(m, accelerations + k)
-        x, v = fma(x, h, load(m, positions + k)), fma(v, h, load(m, velocities + k))
+        coefficient = accelerations[k]
+        x, v = fma(x, h, positions[k]), fma(v, h, velocities[k])
         a, bend = fma(a, h, coefficient), fma(bend, h, absolute(coefficient))
-    x, v, a = fma(x, h, load(m, positions + 1)), fma(v, h, load(m, velocities + 1)), fma(a, h, load(m, accelerations + 1))
+    x, v, a = fma(x, h, positions[1]), fma(v, h, velocities[1]), fma(a, h, accelerations[1])
     square = h * h
-    return x, fma(v, h, load(m, velocities)), fma(a, h, load(m, accelerations)), bend * (square * square)
+    return x, fma(v, h, velocities[0]), fma(a, h, accelerations[0]), bend * (square * square)
 
 
 @inline_jit
-def motion_at(m, at, row, order, start, h):
+def motion_at(lanes, row, start, h):
     """Position (with `start` as its value at 0), velocity, acceleration, and half the acceleration's rate of change, at h."""
-    positions, velocities = at[LanePart.POSITIONS] + row * SERIES_LENGTH, at[LanePart.VELOCITIES] + row * SERIES_LENGTH
-    x, v, a, jerk = load(m, positions + order), load(m, velocities + order), splat(0.0), splat(0.0)
+    order, positions, velocities = lanes.sizes.order, lanes.positions[row], lanes.velocities[row]
+    x, v, a, jerk = positions[order], velocities[order], splat(0.0), splat(0.0)
     for k in range(order - 1, 0, -1):
         jerk, a = fma(jerk, h, a), fma(a, h, v)
-        v, x = fma(v, h, load(m, velocities + k)), fma(x, h, load(m, positions + k))
+        v, x = fma(v, h, velocities[k]), fma(x, h, positions[k])
     jerk, a = fma(jerk, h, a), fma(a, h, v)
-    return fma(x, h, start), fma(v, h, load(m, velocities)), a, jerk
+    return fma(x, h, start), fma(v, h, velocities[0]), a, jerk
 
 
 @inline_jit
-def both_at(m, positions, velocities, order, start, h):
-    """Position (with `start` as its value at 0) and velocity at h. Even and odd powers are summed apart, so that the processor
-    works on four sums at once."""
+def both_at(lanes, row, h):
+    """Position and velocity at h. Even and odd powers are summed apart, so that the processor works on four sums at once."""
+    order, positions, velocities = lanes.sizes.order, lanes.positions[row], lanes.velocities[row]
     square = h * h
     top = order - (order & 1)
-    x, v = load(m, positions + top), load(m, velocities + top)
+    x, v = positions[top], velocities[top]
     y, w = splat(0.0), splat(0.0)
     if order & 1:
-        y, w = load(m, positions + order), load(m, velocities + order)
+        y, w = positions[order], velocities[order]
     for k in range(top - 2, 0, -2):
-        x, v = fma(x, square, load(m, positions + k)), fma(v, square, load(m, velocities + k))
-        y, w = fma(y, square, load(m, positions + k + 1)), fma(w, square, load(m, velocities + k + 1))
-    x, v = fma(x, square, start), fma(v, square, load(m, velocities))
-    y, w = fma(y, square, load(m, positions + 1)), fma(w, square, load(m, velocities + 1))
+        x, v = fma(x, square, positions[k]), fma(v, square, velocities[k])
+        y, w = fma(y, square, positions[k + 1]), fma(w, square, velocities[k + 1])
+    x, v = fma(x, square, positions[0]), fma(v, square, velocities[0])
+    y, w = fma(y, square, positions[1]), fma(w, square, velocities[1])
     return fma(y, h, x), fma(w, h, v)
 
 
@@ -246,19 +224,19 @@ def guess_from_end(cubic, end, sign, h):
 
 
 @inline_jit
-def only_root(m, at, row, order, start, sign, guess, high, chosen):
+def only_root(lanes, gap, guess, high, chosen):
     """The root in (0, high] of gaps that have exactly one there: not negative at 0 (if zero, then growing), negative at `high`.
 
-    The search repeats `root_move` from a guess, with bisection if a move leaves the bracket; `sign` is 1 or -1. A lane that has
-    converged is not changed any more, whatever the others do. Returns the root and the velocity there.
+    The search repeats `root_move` from a guess, with bisection if a move leaves the bracket. A lane that has converged is not
+    changed any more, whatever the others do. Returns the root and the velocity there.
     """
     low, speed, active = splat(0.0), splat(0.0), chosen
     tau = select(mask(bits(guess > 0.0) & bits(guess <= high)), guess, 0.5 * high)  # the guess may have gone astray
     for _ in range(60):
-        x, v, a, jerk = motion_at(m, at, row, order, start, tau)
+        x, v, a, jerk = motion_at(lanes, gap.row, gap.start, tau)
         inverse = rough_inverse(v)
         inverse = inverse * (2.0 - v * inverse)
-        before = mask(bits(sign * x > 0.0))
+        before = mask(bits(gap.sign * x > 0.0))
         low, high = select(before, tau, low), select(before, high, tau)
         following = tau + root_move(x, inverse, 0.5 * a, (1.0 / 3.0) * jerk)
         inside = mask(bits(following >= low) & bits(following <= high))
@@ -273,54 +251,54 @@ def only_root(m, at, row, order, start, sign, guess, high, chosen):
 
 
 @lean_jit
-def lane_value(m, series, order, lane, t):
-    """The value at t of one lane's series."""
-    value = m[(series + order) * WIDTH + lane]
+def series_value(series, order, t):
+    """The value of a series of one lane at t."""
+    value = series[order]
     for k in range(order - 1, -1, -1):
-        value = value * t + m[(series + k) * WIDTH + lane]
+        value = value * t + series[k]
     return value
 
 
 @lean_jit
-def margins_certain(m, at, sizes, h):
+def margins_certain(lanes, h):
     """Bits of the lanes in which every margin certainly stays positive over the step."""
     sure = ALL
-    for stop in range(sizes[Size.MARGINS]):
-        series = at[LanePart.MARGINS] + stop * SERIES_LENGTH
+    for stop in range(lanes.sizes.margins):
+        series = lanes.margins[stop]
         rest = splat(0.0)
-        for k in range(sizes[Size.ORDER] - 1, 0, -1):
-            rest = fma(rest, h, absolute(load(m, series + k)))
-        sure &= bits(load(m, series) > rest * h)
+        for k in range(lanes.sizes.order - 1, 0, -1):
+            rest = fma(rest, h, absolute(series[k]))
+        sure &= bits(series[0] > rest * h)
     return sure
 
 
 @lean_jit
-def series_true(code, m, at, sizes, tol, h, size):
+def series_true(lanes, h, size):
     """Bits of the lanes whose series give, at the end of the step, the acceleration that the model has there.
 
     The new state must be in place. See `steps.leaps`.
     """
-    code[Code.FIELD](m)
+    lanes.code.field(lanes.memory)
     defect = splat(0.0)
-    for row in range(sizes[Size.OWN]):
-        series, slope = at[LanePart.ACCELERATIONS] + row * SERIES_LENGTH, splat(0.0)
-        for k in range(sizes[Size.ORDER] - 1, -1, -1):
-            slope = fma(slope, h, load(m, series + k))
-        defect = maximum(defect, absolute(load(m, at[LanePart.AFTER_VELOCITY] + row) - slope))
-    return bits(defect * h <= (DEFECT * tol) * size)
+    for row in range(lanes.sizes.own):
+        series, slope = lanes.accelerations[row], splat(0.0)
+        for k in range(lanes.sizes.order - 1, -1, -1):
+            slope = fma(slope, h, series[k])
+        defect = maximum(defect, absolute(lanes.after_velocity[row] - slope))
+    return bits(defect * h <= (DEFECT * lanes.settings.tolerance) * size)
 
 
 @inline_jit
-def commit(at, m, moved, hit, speed):
+def commit(lanes, moved, hit, speed):
     """Make the new state the state of the lanes in `moved`, and the state after the impact that of the lanes in `hit`.
 
     `speed` is the speed of the impacts.
     """
     going, impact = mask(moved), mask(hit)
-    replace(m, Slot.NOW, going, load(m, Slot.NEW_TIME))
-    replace(m, Slot.SIDE, impact, load(m, Slot.NEW_SIDE))
-    replace(m, Slot.LEAST_SPEED, impact, minimum(load(m, Slot.LEAST_SPEED), speed))
-    replace(m, Slot.IMPACTS, impact, load(m, Slot.IMPACTS) + 1.0)
-    for row in range(2 * row_count(at)):  # the slots of velocities follow those of positions
-        new = select(impact, load(m, at[LanePart.AFTER_POSITION] + row), load(m, at[LanePart.NEW_POSITION] + row))
-        replace(m, at[LanePart.POSITION] + row, going, new)
+    lanes.now = select(going, lanes.new_time, lanes.now)
+    lanes.side = select(impact, lanes.new_side, lanes.side)
+    lanes.least_speed = select(impact, minimum(lanes.least_speed, speed), lanes.least_speed)
+    lanes.impacts = select(impact, lanes.impacts + 1.0, lanes.impacts)
+    for row in range(2 * lanes.sizes.rows):  # the slots of velocities follow those of positions
+        new = select(impact, lanes.after_position[row], lanes.new_position[row])
+        lanes.position[row] = select(going, new, lanes.position[row])

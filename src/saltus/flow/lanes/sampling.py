@@ -7,32 +7,26 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.flow.kernel.memory_layout import SERIES_LENGTH, LanePart
-from saltus.flow.lanes.lane_layout import Helper, Size, Slot
-from saltus.flow.lanes.lane_steps import both_at, motion_at, row_count, sweep
+from saltus.flow.lanes.lane_steps import both_at, motion_at, sweep
+from saltus.flow.lanes.memory import LONGEST_RECURRENCE, Course
 from saltus.taylor import (
     WIDTH,
     absolute,
     bits,
     fma,
-    get,
     inline_jit,
     lean_jit,
-    load,
     mask,
     maximum,
     minimum,
-    put,
-    replace,
+    one,
     select,
     splat,
-    store,
     vector_lane,
 )
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
-LONGEST_RECURRENCE = 16  # the longest period for which a recurrence is looked for, in forcing periods
 RECURRENT = 1e-10  # largest distance of two states, relative to their size or to 1, at which they count as one
 NEARLY_RECURRENT = 1e4  # largest distance, in units of RECURRENT, at which two states may still approach one another
 ROUNDED = 1e-14  # share of a bound that covers the rounding of a difference of two bounds
@@ -41,13 +35,13 @@ MOST_MOVES = 60  # steps of Newton's method to a turning point: more than bisect
 
 
 @lean_jit
-def turning_value(m, at, row, order, low, high, v_low, v_high, chosen):
+def turning_value(lanes, row, course, chosen):
     """The position at which the velocity vanishes, if it is monotonic and has different signs at the ends."""
-    span, tau = high - low, low + (high - low) * (v_low / (v_low - v_high))
-    before = row * SERIES_LENGTH
-    active, start, value = chosen, load(m, at[LanePart.POSITIONS] + before), splat(0.0)
+    low, high, v_low = course.begin, course.end, course.v_begin
+    span, tau = high - low, low + (high - low) * (v_low / (v_low - course.v))
+    active, start, value = chosen, lanes.positions[row][0], splat(0.0)
     for _ in range(MOST_MOVES):
-        x, v, a, jerk = motion_at(m, at, row, order, start, tau)
+        x, v, a, jerk = motion_at(lanes, row, start, tau)
         first = mask(bits(v * v_low > 0.0))
         low, high = select(first, tau, low), select(first, high, tau)
         newton = v / a
@@ -64,16 +58,19 @@ def turning_value(m, at, row, order, low, high, v_low, v_high, chosen):
 
 
 @inline_jit
-def course(m, at, row, end, ratio, bend):
-    """Properties that a coordinate certainly has on [0, end], from the first six terms of its series and a bound of the others.
+def bounds_of(lanes, row, course):
+    """Properties that a coordinate certainly has from the start of the step to the end of its course, from the first six terms of
+    its series and a bound of the others.
 
-    `bend` is the bound of `sweep` for a step of end / `ratio`. Returns bits of the lanes in which the velocity is monotonic, bits
-    of those in which it keeps its sign, and upper and lower bounds of the coordinate, all by Bernstein coefficients.
+    Returns bits of the lanes in which the velocity is monotonic, bits of those in which it keeps its sign, and upper and lower
+    bounds of the coordinate, all by Bernstein coefficients.
     """
-    series, square = at[LanePart.POSITIONS] + row * SERIES_LENGTH, end * end
+    series, end, bend = lanes.positions[row], course.end, course.bend
+    square = end * end
     cube = square * end
-    g0, g1, g2, g3 = load(m, series), load(m, series + 1) * end, load(m, series + 2) * square, load(m, series + 3) * cube
-    g4, g5 = load(m, series + 4) * (square * square), load(m, series + 5) * (square * cube)
+    g0, g1, g2, g3 = series[0], series[1] * end, series[2] * square, series[3] * cube
+    g4, g5 = series[4] * (square * square), series[5] * (square * cube)
+    ratio = end / course.h
     shrunk = ratio * ratio
     rest = bend * (shrunk * shrunk)
     rest = fma(maximum(rest - 12.0 * absolute(g4) - 20.0 * absolute(g5), splat(0.0)), shrunk, ROUNDED * rest)
@@ -95,100 +92,99 @@ def course(m, at, row, end, ratio, bend):
 
 
 @lean_jit
-def record_range(m, at, row, sizes, h, bend, begin, v_begin, end, x, v, chosen, helpers, poly, series):
-    """Update HIGHEST and LOWEST with the extrema of a coordinate from `begin` to `end` of this step, in chosen lanes.
+def record_range(lanes, row, course, chosen):
+    """Update `highest` and `lowest` with the extrema of a coordinate in its course, in chosen lanes.
 
     Lanes are skipped in forcing periods that are not recorded, and if the coordinate certainly stays between the recorded values.
     If the velocity is certainly monotonic, the extremum within the step is where it vanishes. If it is neither certainly
     monotonic nor certainly of one sign, all turning points are looked for, lane by lane.
     """
-    chosen &= bits(load(m, Slot.PERIOD) >= load(m, Slot.RECORDED_FROM))
+    chosen &= bits(lanes.period >= lanes.recorded_from)
     if chosen == 0:
         return
-    order, positions = sizes[Size.ORDER], at[LanePart.POSITIONS] + row * SERIES_LENGTH
-    high, low = load(m, Slot.HIGHEST), load(m, Slot.LOWEST)
-    top, bottom = maximum(high, x), minimum(low, x)
-    monotonic, one_sign, above, below = course(m, at, row, end, end / h, bend)
+    high, low = lanes.highest, lanes.lowest
+    top, bottom = maximum(high, course.x), minimum(low, course.x)
+    monotonic, one_sign, above, below = bounds_of(lanes, row, course)
     open_ = chosen & ~one_sign & (bits(above > top) | bits(below < bottom))
-    turns = bits(v_begin * v < 0.0) & monotonic & open_
+    turns = bits(course.v_begin * course.v < 0.0) & monotonic & open_
     if turns:
-        turning = turning_value(m, at, row, order, begin, end, v_begin, v, turns)
+        turning = turning_value(lanes, row, course, turns)
         top, bottom = select(mask(turns), maximum(top, turning), top), select(mask(turns), minimum(bottom, turning), bottom)
-    store(m, Slot.HIGHEST, select(mask(chosen), top, high))
-    store(m, Slot.LOWEST, select(mask(chosen), bottom, low))
+    lanes.highest = select(mask(chosen), top, high)
+    lanes.lowest = select(mask(chosen), bottom, low)
     unclear = open_ & ~monotonic
-    if unclear:
-        for lane in range(WIDTH):
-            if (unclear >> lane) & 1:
-                for k in range(order + 1):
-                    series[k] = get(m, positions + k, lane)
-                turning_range = helpers[Helper.TURNING_RANGE]
-                high_there, low_there = turning_range(series, order, vector_lane(begin, lane), vector_lane(end, lane), poly)
-                put(m, Slot.HIGHEST, lane, max(get(m, Slot.HIGHEST, lane), high_there))
-                put(m, Slot.LOWEST, lane, min(get(m, Slot.LOWEST, lane), low_there))
+    for i in range(WIDTH if unclear else 0):
+        if (unclear >> i) & 1:
+            record_turns(one(lanes, i), row, vector_lane(course.begin, i), vector_lane(course.end, i))
 
 
 @lean_jit
-def record_others(m, at, sizes, h, past, end, chosen, helpers, poly, series):
+def record_turns(lane, row, begin, end):
+    """Record all turning points of a coordinate of one lane between two times of the step."""
+    series, order, positions = lane.gap, lane.sizes.order, lane.positions[row]
+    for k in range(order + 1):
+        series[k] = positions[k]
+    turning_range = lane.helpers.turning_range
+    high, low = turning_range(series, order, begin, end, lane.polynomial)
+    lane.highest, lane.lowest = max(lane.highest, high), min(lane.lowest, low)
+
+
+@lean_jit
+def record_others(lanes, step, past, chosen):
     """`record_range` for all coordinates but the first, up to the new state; in lanes `past` the end of a period, from this
     end."""
-    since, order = load(m, Slot.PERIOD_END) - load(m, Slot.NOW), sizes[Size.ORDER]
-    for row in range(1, sizes[Size.OWN]):
-        _, _, _, bend = sweep(m, at, row, order, h)
-        begin = select(mask(past), since, splat(0.0))
-        v_begin = select(mask(past), load(m, at[LanePart.ENDED_VELOCITY] + row), load(m, at[LanePart.VELOCITY] + row))
-        x, v = load(m, at[LanePart.NEW_POSITION] + row), load(m, at[LanePart.NEW_VELOCITY] + row)
-        record_range(m, at, row, sizes, h, bend, begin, v_begin, end, x, v, chosen, helpers, poly, series)
+    begin = select(mask(past), lanes.period_end - lanes.now, splat(0.0))
+    for row in range(1, lanes.sizes.own):
+        _, _, _, bend = sweep(lanes, row, step.h)
+        v_begin = select(mask(past), lanes.ended_velocity[row], lanes.velocity[row])
+        x, v = lanes.new_position[row], lanes.new_velocity[row]
+        record_range(lanes, row, Course(begin, step.taken, v_begin, x, v, step.h, bend), chosen)
 
 
 @lean_jit
-def pass_ends(m, at, sizes, h, bend, past, helpers, poly, series):
+def pass_ends(lanes, step, past):
     """End the forcing period in lanes whose step goes past its end: keep its records and begin new ones.
 
     The state at the end is evaluated from the step's series. `forcing_periods.end_here` does the same for one lane whose state is
     at the end of the period.
     """
-    order, since = sizes[Size.ORDER], load(m, Slot.PERIOD_END) - load(m, Slot.NOW)
-    chosen = mask(past)
-    for row in range(row_count(at)):
-        positions = at[LanePart.POSITIONS] + row * SERIES_LENGTH
-        x, v = both_at(m, positions, at[LanePart.VELOCITIES] + row * SERIES_LENGTH, order, load(m, positions), since)
-        replace(m, at[LanePart.ENDED_POSITION] + row, chosen, x)
-        replace(m, at[LanePart.ENDED_VELOCITY] + row, chosen, v)
-    if sizes[Size.EXTREMA] > 0:
-        x, v = load(m, at[LanePart.ENDED_POSITION]), load(m, at[LanePart.ENDED_VELOCITY])
-        v_begin = load(m, at[LanePart.VELOCITY])
-        record_range(m, at, 0, sizes, h, bend, splat(0.0), v_begin, since, x, v, past, helpers, poly, series)
-        for row in range(1, sizes[Size.OWN]):
-            q, w = load(m, at[LanePart.ENDED_POSITION] + row), load(m, at[LanePart.ENDED_VELOCITY] + row)
-            w_begin, (_, _, _, bent) = load(m, at[LanePart.VELOCITY] + row), sweep(m, at, row, order, h)
-            record_range(m, at, row, sizes, h, bent, splat(0.0), w_begin, since, q, w, past, helpers, poly, series)
-    keep_ended(m, at, sizes, past)
+    since, chosen = lanes.period_end - lanes.now, mask(past)
+    for row in range(lanes.sizes.rows):
+        x, v = both_at(lanes, row, since)
+        lanes.ended_position[row] = select(chosen, x, lanes.ended_position[row])
+        lanes.ended_velocity[row] = select(chosen, v, lanes.ended_velocity[row])
+    for row in range(lanes.sizes.own if lanes.sizes.extrema > 0 else 0):
+        bend = step.bend
+        if row > 0:
+            _, _, _, bend = sweep(lanes, row, step.h)
+        x, v = lanes.ended_position[row], lanes.ended_velocity[row]
+        record_range(lanes, row, Course(splat(0.0), since, lanes.velocity[row], x, v, step.h, bend), past)
+    keep_ended(lanes, past)
 
 
 @inline_jit
-def keep_ended(m, at, sizes, past):
+def keep_ended(lanes, past):
     """Keep the records of a forcing period that is over in the lanes in `past`, and begin new ones at the state at its end."""
-    chosen, x = mask(past), load(m, at[LanePart.ENDED_POSITION])
-    high, low, least, impacts = load(m, Slot.HIGHEST), load(m, Slot.LOWEST), load(m, Slot.LEAST_SPEED), load(m, Slot.IMPACTS)
-    replace(m, Slot.ENDED_SIDE, chosen, load(m, Slot.SIDE))
-    replace(m, Slot.ENDED_HIGHEST, chosen, high)
-    replace(m, Slot.ENDED_LOWEST, chosen, low)
-    replace(m, Slot.ENDED_LEAST_SPEED, chosen, least)
-    replace(m, Slot.ENDED_IMPACTS, chosen, impacts)
-    replace(m, Slot.OVERALL_HIGHEST, chosen, maximum(load(m, Slot.OVERALL_HIGHEST), high))
-    replace(m, Slot.OVERALL_LOWEST, chosen, minimum(load(m, Slot.OVERALL_LOWEST), low))
-    replace(m, Slot.OVERALL_LEAST_SPEED, chosen, minimum(load(m, Slot.OVERALL_LEAST_SPEED), least))
-    replace(m, Slot.OVERALL_IMPACTS, chosen, load(m, Slot.OVERALL_IMPACTS) + impacts)
-    replace(m, Slot.HIGHEST, chosen, x)
-    replace(m, Slot.LOWEST, chosen, x)
-    for row in range(1, sizes[Size.OWN]):
-        q = load(m, at[LanePart.ENDED_POSITION] + row)
-        replace(m, Slot.HIGHEST, chosen, maximum(load(m, Slot.HIGHEST), q))
-        replace(m, Slot.LOWEST, chosen, minimum(load(m, Slot.LOWEST), q))
-    replace(m, Slot.LEAST_SPEED, chosen, splat(np.inf))
-    replace(m, Slot.IMPACTS, chosen, splat(0.0))
-    replace(m, Slot.NEXT_CHECK, chosen, load(m, Slot.NEXT_CHECK) - impacts)
+    chosen, x = mask(past), lanes.ended_position[0]
+    high, low, least, impacts = lanes.highest, lanes.lowest, lanes.least_speed, lanes.impacts
+    lanes.ended_side = select(chosen, lanes.side, lanes.ended_side)
+    lanes.ended_highest = select(chosen, high, lanes.ended_highest)
+    lanes.ended_lowest = select(chosen, low, lanes.ended_lowest)
+    lanes.ended_least_speed = select(chosen, least, lanes.ended_least_speed)
+    lanes.ended_impacts = select(chosen, impacts, lanes.ended_impacts)
+    lanes.overall_highest = select(chosen, maximum(lanes.overall_highest, high), lanes.overall_highest)
+    lanes.overall_lowest = select(chosen, minimum(lanes.overall_lowest, low), lanes.overall_lowest)
+    lanes.overall_least_speed = select(chosen, minimum(lanes.overall_least_speed, least), lanes.overall_least_speed)
+    lanes.overall_impacts = select(chosen, lanes.overall_impacts + impacts, lanes.overall_impacts)
+    lanes.highest = select(chosen, x, lanes.highest)
+    lanes.lowest = select(chosen, x, lanes.lowest)
+    for row in range(1, lanes.sizes.own):
+        q = lanes.ended_position[row]
+        lanes.highest = select(chosen, maximum(lanes.highest, q), lanes.highest)
+        lanes.lowest = select(chosen, minimum(lanes.lowest, q), lanes.lowest)
+    lanes.least_speed = select(chosen, splat(np.inf), lanes.least_speed)
+    lanes.impacts = select(chosen, splat(0.0), lanes.impacts)
+    lanes.next_check = select(chosen, lanes.next_check - impacts, lanes.next_check)
 
 
 @lean_jit

@@ -13,11 +13,27 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow.kernel.layout import CHATTER_SPEED, SHORTEST, SLOW
+from saltus.flow.contacts.layout import ContactColumn
+from saltus.flow.contacts.solver_memory import solver_arrays
+from saltus.flow.kernel.layout import CHATTER_SPEED, ROUGHER, SHORTEST, SLOW
+from saltus.flow.kernel.memory import MOTION
+from saltus.flow.kernel.memory_layout import SERIES_LENGTH
 from saltus.flow.kernel.structures import Program, taylor_order
 from saltus.flow.lanes.compiled_lanes import compile_everything, load_advance, load_driver, load_helpers
-from saltus.flow.lanes.lane_functions import Slots
-from saltus.flow.lanes.lane_layout import EndLabel, EndNumber, Size
+from saltus.flow.lanes.lane_steps import step_limits
+from saltus.flow.lanes.memory import (
+    END,
+    FLAGS,
+    LONGEST_RECURRENCE,
+    ROW,
+    Code,
+    Group,
+    Helpers,
+    LaneSettings,
+    MemoryPlan,
+    Sizes,
+    Work,
+)
 from saltus.progress import Progress, silent
 from saltus.taylor import CACHE_LINE, WIDTH
 
@@ -64,8 +80,7 @@ class Jobs:
     """Trajectories to run, an array with a row for each."""
 
     states: np.ndarray  # (n, 2 coordinates): coordinates, then velocities
-    numbers: np.ndarray  # (n, len(JobNumber))
-    labels: np.ndarray  # (n, len(JobLabel))
+    rows: np.ndarray  # (n,), see `JOB`
     columns: dict[int, np.ndarray]  # by the parameter's place, (n,)
     records: tuple[np.ndarray, np.ndarray]  # breakpoints (n or 1, m) and pieces, see `record_tables`
 
@@ -78,47 +93,24 @@ class Ends:
     """How the trajectories ended, an array with a row for each."""
 
     states: np.ndarray  # (n, 2 coordinates)
-    numbers: np.ndarray  # (n, EndNumber.RATES + own coordinates + columns of the tangent)
-    labels: np.ndarray  # (n, len(EndLabel))
+    rows: np.ndarray  # (n,), see `END`
+    rates: np.ndarray  # (n, own coordinates + columns of the tangent): accelerations, then the shifts of the last event
     samples: np.ndarray  # (n, kept, columns asked for)
-
-    def of(self, label: EndLabel) -> np.ndarray:
-        """One of the labels of every trajectory, (n,)."""
-        column: np.ndarray = self.labels[:, label]
-        return column
 
 
 _sharing: list[Callable[[], int]] = [lambda: 1]  # how many processes share the cores
 
 
 def share_cores(processes: Callable[[], int]) -> None:
-    """Let this process use only its share of the cores, as other processes compute at the same time.
+    """Let this process use only its share of the cores, as other processes compute at the same time; `processes` counts them.
 
     More threads than cores would only split small ensembles further, and more lanes would stand empty at the end.
-
-    Parameters
-    ----------
-    processes
-        Called whenever an ensemble begins, for how many processes share the cores now.
-
-    Examples
-    --------
-    >>> saltus.flow.share_cores(lambda: 10_000)
-    >>> saltus.flow.available_cores()
-    1
-    >>> saltus.flow.share_cores(lambda: 1)
     """
     _sharing[:] = [processes]
 
 
 def available_cores() -> int:
-    """The number of cores that this process may use, or its share of them (`share_cores`).
-
-    Examples
-    --------
-    >>> saltus.flow.available_cores() >= 1
-    True
-    """
+    """The number of cores that this process may use, or its share of them (`share_cores`)."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return max(1, cores // max(1, _sharing[0]()))
 
@@ -137,7 +129,7 @@ class Lanes:
     """A structure ready to run in lanes, with the settings that are the same for all of its trajectories."""
 
     program: Program
-    slots: Slots
+    plan: MemoryPlan
     functions: tuple[Any, ...]  # lane_series, lane_impact, lane_field, and of a model with several contacts lane_one_free
     parameters: np.ndarray  # of the system; `Jobs.columns` replaces some
     tol: float
@@ -159,8 +151,8 @@ class Lanes:
         threads = max(1, min(threads, math.ceil(n / WIDTH)))  # starting a thread costs time even if it has no lanes
         ends = Ends(
             np.empty((n, jobs.states.shape[1])),
-            np.zeros((n, EndNumber.RATES + own + self.program.structure.sizes.columns)),
-            np.empty((n, len(EndLabel)), dtype=np.int64),
+            np.zeros(n, dtype=END),
+            np.zeros((n, own + self.program.structure.sizes.columns)),
             np.empty((n, self.kept, len(self.sampled))),
         )
         controls = [np.zeros(2, dtype=np.int64) for _ in range(threads)]
@@ -196,66 +188,113 @@ class Lanes:
 
     def _work(self, jobs: Jobs, ends: Ends, waiting: Iterator[slice], lock: threading.Lock, control: np.ndarray) -> None:
         """Run chunk after chunk until there are none."""
-        fixed = self._arguments()
-        memory = self._memory()
+        group = self._group(control)
         while True:
             with lock:
                 rows = next(waiting, None)
             if rows is None or control[0]:
                 return
-            self._run_chunk(fixed, memory, jobs, ends, rows, control)
+            self._run_chunk(group, jobs, ends, rows)
 
-    def _run_chunk(
-        self, fixed: tuple[Any, ...], memory: np.ndarray, jobs: Jobs, ends: Ends, rows: slice, control: np.ndarray
-    ) -> None:
+    def _run_chunk(self, group: Group, jobs: Jobs, ends: Ends, rows: slice) -> None:
         states = np.ascontiguousarray(jobs.states[rows])
         parameters = np.tile(self.parameters, (len(states), 1))
         for place, column in jobs.columns.items():
             parameters[:, place] = column[rows]
-        samples = np.full((len(states), self.kept, 2 * self.own + 4), np.nan)
-        results = (ends.states[rows], ends.numbers[rows], ends.labels[rows], samples)
-        chunk = (states, jobs.numbers[rows], jobs.labels[rows], parameters)
         tables = tuple(table if len(table) == 1 else table[rows] for table in jobs.records)
-        load_driver(self.several)(*fixed, memory, chunk, tables, results, control)
+        samples = np.full((len(states), self.kept, 2 * self.own + 4), np.nan)
+        work = Work(
+            states=states,
+            jobs=jobs.rows[rows],
+            parameters=parameters,
+            tables=(tables[0], tables[1]),
+            last=ends.states[rows],
+            ends=ends.rows[rows],
+            rates=ends.rates[rows],
+            samples=samples,
+            control=group.work.control,
+        )
+        load_driver(self.several)(group._replace(work=work))
         ends.samples[rows] = samples[:, :, self.sampled]
 
-    def _arguments(self) -> tuple[Any, ...]:
-        """The arguments that are the same in every call of the driver: functions, sizes, places and settings."""
-        structure, trace = self.program.structure, self.program.trace
-        counts, scalar = structure.sizes, self.program.model if self.several else structure.functions
-        code = (*self.functions[:3], *structure.tables, *self.functions[3:])
-        contacts = np.array([len(trace.signs), *trace.held, *trace.signs, *trace.rubbed], dtype=np.int64)
-        sizes = np.concatenate([np.zeros(Size.CONTACTS, dtype=np.int64), contacts])
-        given = {
-            Size.OWN: counts.own,
-            Size.FRICTIONS: len(trace.rubbed),
-            Size.COLUMNS: counts.columns,
-            Size.MARGINS: counts.stops,
-            Size.SIDES: counts.sides,
-            Size.CHECKED: counts.steep,
-            Size.RECORDS: self.slots.records,
-            Size.ONE_FREE: self.slots.guards is not None and not counts.steep,
-            Size.GUARDS: self.slots.guards or 0,
-            Size.CONSTANT_GUARDS: self.slots.constant_guards,
-            Size.ORDER: lane_order(self.tol),
-            Size.SCALAR_ORDER: taylor_order(self.tol),
-            Size.WORKSPACE: counts.rows,
-            Size.KEPT: self.kept,
-            Size.EXTREMA: self.extrema,
-            Size.FROM_START: self.from_start,
-            Size.SETTLE: self.settle,
-            Size.ENDS_ASKED: self.settle or bool(self.sampled),
-            Size.EVERY_END: self.settle or self.kept > 1,
-        }
-        sizes[list(given)] = list(given.values())
+    def _group(self, control: np.ndarray) -> Group:
+        """A group of lanes for one thread, still without work; `control` = [whether to stop, forcing periods done so far]."""
+        trace, own, plan = self.program.trace, self.own, self.plan
+        contacts, frictions = len(trace.signs), len(trace.rubbed)
+        numbers = own * own + contacts * contacts + contacts + frictions if self.several else 3
+        nothing = np.zeros((0, 0))
+        return Group(
+            memory=self._memory(),
+            places=np.array(plan.places, dtype=np.int64),
+            sizes=self._sizes(),
+            settings=self._settings(),
+            code=self._code(),
+            helpers=Helpers(*load_helpers(self.several), *([] if self.several else [None])),
+            kernel=(load_advance(self.several), self.program.model if self.several else self.program.structure.functions),
+            flags=np.zeros(1, dtype=FLAGS),
+            rows=np.zeros(WIDTH, dtype=ROW),
+            constants_of=np.zeros((WIDTH, plan.constants)),
+            geometry=np.zeros((WIDTH, numbers)),
+            stroboscopic=np.zeros((WIDTH, 2 * LONGEST_RECURRENCE, 2 * own)),
+            agreements=np.zeros((WIDTH, LONGEST_RECURRENCE + 1), dtype=np.int64),
+            contact_rows=np.zeros((WIDTH, contacts + frictions, ContactColumn.WAITS + 1), dtype=np.int64),
+            polynomial=np.zeros(SERIES_LENGTH + 2),
+            gap=np.zeros(SERIES_LENGTH + 2),
+            impact_space=self._impact_space() if self.several else None,
+            work=Work(nothing, np.zeros(0), nothing, (nothing, nothing), nothing, np.zeros(0), nothing, nothing, control),
+        )
+
+    def _impact_space(self) -> tuple[Any, ...]:
+        """Room for an impact in a model with several contacts."""
+        trace, own = self.program.trace, self.own
+        contacts = len(trace.signs)
+        rows = np.zeros((contacts, ContactColumn.WAITS + 1), dtype=np.int64)
+        return np.zeros(1, dtype=MOTION), np.zeros(2 * own), rows, solver_arrays(own, contacts, 0, len(trace.rubbed))
+
+    def _sizes(self) -> Sizes:
+        """The numbers of the structure, and of what is asked for."""
+        sizes, trace, plan = self.program.structure.sizes, self.program.trace, self.plan
+        return Sizes(
+            own=sizes.own,
+            rows=sizes.dof,
+            columns=sizes.columns,
+            margins=sizes.stops,
+            sides=sizes.sides,
+            checked=sizes.steep,
+            records=plan.records,
+            order=lane_order(self.tol),
+            scalar_order=taylor_order(self.tol),
+            workspace=sizes.rows,
+            kept=self.kept,
+            extrema=int(self.extrema),
+            from_start=int(self.from_start),
+            settle=int(self.settle),
+            ends_asked=int(self.settle or bool(self.sampled)),
+            every_end=int(self.settle or self.kept > 1),
+            one_free=int(plan.guards is not None and not sizes.steep),
+            guards=plan.guards or 0,
+            constant_guards=plan.constant_guards,
+            contacts=len(trace.signs),
+            frictions=len(trace.rubbed),
+            coordinates=np.array([*trace.held, *trace.rubbed], dtype=np.int64),
+            signs=np.array(trace.signs, dtype=np.int64),
+        )
+
+    def _settings(self) -> LaneSettings:
+        order = lane_order(self.tol)
         slowest = max(SLOW * math.sqrt(self.tol), CHATTER_SPEED)
-        settings = np.array([self.tol, SHORTEST, slowest])  # in the places of `LaneSetting`
-        places = np.array(list(self.slots.places.values()), dtype=np.int64)
-        return code, (load_advance(self.several), scalar), load_helpers(self.several), sizes, places, settings
+        limits = step_limits(order, self.tol), step_limits(order, ROUGHER * self.tol)
+        return LaneSettings(self.tol, SHORTEST, slowest, *limits)
+
+    def _code(self) -> Code:
+        """The functions of the structure."""
+        series, impact, field, *one_free = self.functions
+        constants, geometry = self.program.structure.tables
+        return Code(series, impact, field, constants, geometry, one_free[0] if one_free else None)
 
     def _memory(self) -> np.ndarray:
         """The lanes' memory, aligned such that each vector lies within one cache line; otherwise every load would touch two."""
-        size, line = self.slots.end * WIDTH, CACHE_LINE // 8
+        size, line = self.plan.end * WIDTH, CACHE_LINE // 8
         buffer = np.zeros(size + line)
         start = -(buffer.ctypes.data // 8) % line
         return buffer[start : start + size]

@@ -17,7 +17,7 @@ from saltus.flow.kernel.structures import limits_of
 from saltus.flow.lanes.ensemble import run_ensemble, simulate_many
 from saltus.flow.lanes.ensemble_result import EnsembleResult
 from saltus.flow.lanes.inputs import read_inputs
-from saltus.flow.lanes.wanted import Sample, Until, Wanted, read_threads
+from saltus.flow.lanes.options import EnsembleOptions, Sample, Until, read_threads
 from saltus.flow.long_time.load_release import load_releases
 from saltus.flow.motion.dataset import state_names
 from saltus.flow.motion.stops import Stop
@@ -210,7 +210,7 @@ def find_recurrence(
     limits = limits_of(system, ())
     sampled = {Sample.STATE: kept != 0, Sample.EXTREMA: extrema, Sample.IMPACT_COUNT: impact_count, Sample.SPEED: speed}
     size = periods if kept is None else kept
-    wanted = Wanted(
+    options = EnsembleOptions(
         tol=tol,
         periods=periods,
         limits=limits,
@@ -221,9 +221,9 @@ def find_recurrence(
     last = max(1, min(max(size, max_period if extrema or impact_count or speed else 1), periods))
     coordinates, velocity = _as_arguments(system, states)
     inputs = read_inputs(system, velocity, 0.0, parameters, coordinates)
-    result = run_ensemble(system, inputs, wanted, read_threads(threads), progress, last=last, captured=captured)
+    result = run_ensemble(system, inputs, options, read_threads(threads), progress, last=last, captured=captured)
     found = replace(_read(result), outcome=_outcome(result, parameters is not None))
-    if found.extrema is not None and not wanted.from_start:
+    if found.extrema is not None and not options.from_start:
         found.extrema[~result.stopped(Stop.HORIZON, Stop.REST, Stop.SETTLED)] = np.nan
     return _with_periods(found, result.recurrence_period if stop_early else None, max_period, settings)
 
@@ -249,10 +249,10 @@ def ensemble_from(
     With `derivatives` those to the initial states are computed, too.
     """
     paths = () if derivatives else None
-    wanted = Wanted(tol=tol, periods=periods, limits=limits_of(system, ()), until=until, paths=paths)
+    options = EnsembleOptions(tol=tol, periods=periods, limits=limits_of(system, ()), until=until, paths=paths)
     coordinates, velocity = _as_arguments(system, states)
     inputs = read_inputs(system, velocity, 0.0, parameters, coordinates)
-    return run_ensemble(system, inputs, wanted, read_threads(None), silent)
+    return run_ensemble(system, inputs, options, read_threads(None), silent)
 
 
 def _as_arguments(system: System, states: np.ndarray) -> tuple[dict[str, Any], Any]:

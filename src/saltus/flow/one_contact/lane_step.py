@@ -5,177 +5,123 @@ Its compiled part goes into one module with that of `lanes/driver.py`; `contacts
 
 from __future__ import annotations
 
-import numpy as np
-
 from saltus.flow.kernel.layout import CHATTER_SPEED, LOSSLESS
-from saltus.flow.kernel.memory_layout import SERIES_LENGTH, LanePart
-from saltus.flow.lanes.lane_layout import FAST, SMALLEST_SHARE, Code, Flag, LaneArray, LaneSetting, Size, Slot
-from saltus.flow.lanes.lane_steps import (
-    both_at,
-    commit,
-    margins_certain,
-    natural_step,
-    row_count,
-    series_true,
-    state_size,
-    sweep,
-)
-from saltus.flow.lanes.meeting import meet
-from saltus.flow.lanes.sampling import LONGEST_RECURRENCE, pass_ends, record_others, record_range
+from saltus.flow.lanes.gap_roots import find_contact
+from saltus.flow.lanes.lane_steps import both_at, commit, margins_certain, natural_step, series_true, state_size, sweep
+from saltus.flow.lanes.memory import FAST, SMALLEST_SHARE, Course, Gap, Step
+from saltus.flow.lanes.sampling import pass_ends, record_others, record_range
 from saltus.flow.one_contact.sides import side_of_state
-from saltus.taylor import (
-    WIDTH,
-    absolute,
-    bits,
-    fma,
-    inline_jit,
-    jit,
-    lean_jit,
-    load,
-    mask,
-    minimum,
-    put,
-    select,
-    splat,
-    store,
-)
+from saltus.taylor import absolute, bits, fma, inline_jit, lean_jit, mask, minimum, select, splat
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
 
-@jit
-def lane_arrays(sizes, at):
-    """Arrays with a row for each lane, in the places of `LaneArray`."""
-    return (
-        np.zeros((WIDTH, 8), dtype=np.int64),
-        np.zeros((WIDTH, 2)),
-        np.zeros((WIDTH, at[LanePart.RECORDS] - at[LanePart.CONSTANTS])),
-        np.zeros((WIDTH, 3)),
-        np.zeros((WIDTH, 2 * LONGEST_RECURRENCE, 2 * sizes[Size.OWN])),
-        np.zeros((WIDTH, LONGEST_RECURRENCE + 1), dtype=np.int64),
-    )
-
-
-@jit
-def lane_space(sizes, at):
-    """Room for two polynomials of one lane."""
-    return np.zeros(SERIES_LENGTH + 2), np.zeros(SERIES_LENGTH + 2)
-
-
 @inline_jit
-def begin_contact(lane, code, sizes, at, m, lanes, env, state, piece):
+def begin_contact(lane, env, state):
     """Tell a lane where its contact is; returns the mode in which a motion from this state begins, and its side."""
-    geometry = lanes[LaneArray.GEOMETRY][lane]
-    code[Code.GEOMETRY](env, geometry)
-    for j in range(geometry.size):
-        put(m, Slot.CONTACT + j, lane, geometry[j])
-    return side_of_state(sizes[Size.SIDES], state[0], state[state.size // 2], geometry)
+    numbers, geometry = lane.geometry[lane.index], lane.code.geometry
+    geometry(env, numbers)
+    lane.contact, lane.rate_up, lane.rate_down = numbers[0], numbers[1], numbers[2]
+    return side_of_state(lane.sizes.sides, state[0], state[state.size // 2], numbers)
 
 
 @inline_jit
-def rate_on(m, slot):
-    """The gap's rate of change with the coordinate, on the side that a slot holds."""
-    return select(mask(bits(load(m, slot) > 0.0)), load(m, Slot.RATE_UP), load(m, Slot.RATE_DOWN))
+def rate_on(lanes, side):
+    """The gap's rate of change with the coordinate, on a side."""
+    return select(mask(bits(side > 0.0)), lanes.rate_up, lanes.rate_down)
 
 
 @inline_jit
-def propose(code, sizes, at, m, flags, settings, limits, helpers, space):
-    """Compute the step of every lane up to its first contact, and put the new state into the slots NEW_*.
+def propose(lanes):
+    """Compute the step of every lane up to its first contact, and put the new state into its slots.
 
-    Returns bits of the lanes that hit, bits for the scalar kernel, and bits of the lanes that wait for a shorter step; the length
-    h of the step, the part tau of it that is taken, and the bound `bend` of `sweep`.
+    Returns bits of the lanes that hit, bits for the scalar kernel, bits of the lanes that wait for a shorter step, and the step.
     """
-    order = sizes[Size.ORDER]
-    code[Code.SERIES](m, order)
-    size = state_size(m, at, sizes)
-    share = load(m, Slot.STEP_SHARE)
-    natural = share * natural_step(m, at, sizes, limits, size)
-    now, limit = load(m, Slot.NOW), load(m, Slot.STEP_LIMIT)
+    series = lanes.code.series
+    series(lanes.memory, lanes.sizes.order)
+    size, share, now, limit = state_size(lanes), lanes.step_share, lanes.now, lanes.step_limit
+    natural = share * natural_step(lanes, size)
     h = minimum(natural, limit - now)
-    alive = flags[Flag.BUSY] & ~flags[Flag.SCALAR]
-    sound = bits(natural > settings[LaneSetting.SHORTEST_STEP]) & bits(size < FAST)
-    contact, position = load(m, Slot.CONTACT), load(m, at[LanePart.POSITION])
-    mean, v, a, bend = sweep(m, at, 0, order, h)
-    if sizes[Size.MARGINS] > 0:
-        sound &= margins_certain(m, at, sizes, h)
+    alive = lanes.busy & ~lanes.scalar
+    sound = bits(natural > lanes.settings.shortest_step) & bits(size < FAST)
+    contact, position = lanes.contact, lanes.position[0]
+    mean, v, a, bend = sweep(lanes, 0, h)
+    if lanes.sizes.margins > 0:
+        sound &= margins_certain(lanes, h)
     hit, waits, tau, at_root = 0, 0, h, v
-    if sizes[Size.SIDES] > 0:
-        sign = select(mask(bits(rate_on(m, Slot.SIDE) > 0.0)), splat(1.0), splat(-1.0))  # a root depends on these numbers alone
+    if lanes.sizes.sides > 0:
+        sign = select(mask(bits(rate_on(lanes, lanes.side) > 0.0)), splat(1.0), splat(-1.0))  # a root depends on these alone
         start = position - contact  # measured from the contact, so that a small gap keeps its digits
-        end, skip = (fma(mean, h, start), v, a), flags[Flag.AT_CONTACT]
-        patient = bits(share > SMALLEST_SHARE)
-        hit, doubtful, waits, tau, at_root = meet(
-            at, 0, m, order, h, sign, start, end, bend, skip, alive & sound, patient, helpers, space
-        )
+        gap, patient = Gap(0, start, sign, lanes.at_contact), bits(share > SMALLEST_SHARE)
+        end = fma(mean, h, start), v, a, bend
+        hit, doubtful, waits, tau, at_root = find_contact(lanes, gap, h, end, alive & sound, patient)
         sound &= ~doubtful
     impact = mask(hit)
-    store(m, Slot.NEW_TIME, select(mask(bits(natural >= limit - now) & ~hit), limit, now + tau))
-    store(m, at[LanePart.NEW_POSITION], select(impact, contact, fma(mean, h, position)))
-    store(m, at[LanePart.NEW_VELOCITY], select(impact, at_root, v))
-    for row in range(1, row_count(at)):
-        positions, velocities = at[LanePart.POSITIONS] + row * SERIES_LENGTH, at[LanePart.VELOCITIES] + row * SERIES_LENGTH
-        q, w = both_at(m, positions, velocities, order, load(m, positions), tau)
-        store(m, at[LanePart.NEW_POSITION] + row, q)
-        store(m, at[LanePart.NEW_VELOCITY] + row, w)
-    if sizes[Size.CHECKED] > 0:
-        sound &= series_true(code, m, at, sizes, settings[LaneSetting.TOLERANCE], tau, size)
-    store(m, Slot.STEP_SHARE, select(mask(waits), 0.5 * share, splat(1.0)))
-    return hit & sound & alive, alive & ~sound & ~waits, waits, h, tau, bend
+    lanes.new_time = select(mask(bits(natural >= limit - now) & ~hit), limit, now + tau)
+    lanes.new_position[0] = select(impact, contact, fma(mean, h, position))
+    lanes.new_velocity[0] = select(impact, at_root, v)
+    for row in range(1, lanes.sizes.rows):
+        q, w = both_at(lanes, row, tau)
+        lanes.new_position[row], lanes.new_velocity[row] = q, w
+    if lanes.sizes.checked > 0:
+        sound &= series_true(lanes, tau, size)
+    lanes.step_share = select(mask(waits), 0.5 * share, splat(1.0))
+    return hit & sound & alive, alive & ~sound & ~waits, waits, Step(h, tau, bend, splat(0.0))
 
 
 @inline_jit
-def reset(code, at, m, settings, hit):
+def reset(lanes, hit):
     """Apply the reset at the new state. Returns bits of the lanes that are resolved, bits for the scalar kernel, and bits of
     those that are captured."""
-    code[Code.IMPACT](m)
-    approach = rate_on(m, Slot.SIDE) * load(m, at[LanePart.NEW_VELOCITY])
-    speed = rate_on(m, Slot.NEW_SIDE) * load(m, at[LanePart.AFTER_VELOCITY])
+    impact = lanes.code.impact
+    impact(lanes.memory)
+    approach = rate_on(lanes, lanes.side) * lanes.new_velocity[0]
+    speed = rate_on(lanes, lanes.new_side) * lanes.after_velocity[0]
     good = bits(approach < 0.0) & bits(speed > CHATTER_SPEED) & hit
-    slow = good & ~bits(speed > settings[LaneSetting.SLOWEST_IMPACT])
+    slow = good & ~bits(speed > lanes.settings.slowest_impact)
     if slow:
-        good &= ~slow | loses_nothing(code, at, m, speed)
-    captured = bits(speed < load(m, Slot.CAPTURE_SPEED)) & good
+        good &= ~slow | loses_nothing(lanes, speed)
+    captured = bits(speed < lanes.capture_speed) & good
     return good, hit & ~good, captured
 
 
 @lean_jit
-def loses_nothing(code, at, m, speed):
+def loses_nothing(lanes, speed):
     """Bits of the lanes in which the next two impacts would not change the gap's `speed`, so that impacts do not accumulate.
 
-    `contact.accumulation` tests the same in the scalar kernel.
+    `impacts.accumulation` tests the same in the scalar kernel.
     """
-    side, before = load(m, Slot.SIDE), load(m, at[LanePart.NEW_VELOCITY])
+    side, before, impact = lanes.side, lanes.new_velocity[0], lanes.code.impact
     for _ in range(2):
-        store(m, Slot.SIDE, load(m, Slot.NEW_SIDE))
-        store(m, at[LanePart.NEW_VELOCITY], -load(m, at[LanePart.AFTER_VELOCITY]))
-        code[Code.IMPACT](m)
-    loss = speed - rate_on(m, Slot.NEW_SIDE) * load(m, at[LanePart.AFTER_VELOCITY])
-    store(m, Slot.SIDE, side)
-    store(m, at[LanePart.NEW_VELOCITY], before)
-    code[Code.IMPACT](m)
+        lanes.side = lanes.new_side
+        lanes.new_velocity[0] = -lanes.after_velocity[0]
+        impact(lanes.memory)
+    loss = speed - rate_on(lanes, lanes.new_side) * lanes.after_velocity[0]
+    lanes.side, lanes.new_velocity[0] = side, before
+    impact(lanes.memory)
     return bits(absolute(loss) < LOSSLESS * speed)
 
 
 @inline_jit
-def step_all(code, scalar, sizes, at, m, flags, settings, limits, helpers, lanes, jobs, tables, space):
+def step_all(lanes):
     """One step of all lanes. Returns bits for the scalar kernel, bits captured, and bits past the end of their forcing period."""
-    hit, scalar, waits, h, tau, bend = propose(code, sizes, at, m, flags, settings, limits, helpers, space)
-    captured = 0
-    resolved = hit
+    hit, doubtful, waits, step = propose(lanes)
+    captured, resolved = 0, hit
     if hit:
-        resolved, doubtful, captured = reset(code, at, m, settings, hit)
-        scalar |= doubtful
-    moved = flags[Flag.BUSY] & ~flags[Flag.SCALAR] & ~scalar & ~waits
-    begin, v_begin = splat(0.0), load(m, at[LanePart.VELOCITY])
-    past = moved & bits(load(m, Slot.NEW_TIME) > load(m, Slot.PERIOD_END))
-    if past and sizes[Size.ENDS_ASKED] > 0:
-        pass_ends(m, at, sizes, h, bend, past, helpers, space[0], space[1])
-        begin = select(mask(past), load(m, Slot.PERIOD_END) - load(m, Slot.NOW), begin)
-        v_begin = select(mask(past), load(m, at[LanePart.ENDED_VELOCITY]), v_begin)
-    if sizes[Size.EXTREMA] > 0:
-        x, v = load(m, at[LanePart.NEW_POSITION]), load(m, at[LanePart.NEW_VELOCITY])
-        record_range(m, at, 0, sizes, h, bend, begin, v_begin, tau, x, v, moved, helpers, space[0], space[1])
-        record_others(m, at, sizes, h, past, tau, moved, helpers, space[0], space[1])
-    commit(at, m, moved, resolved, absolute(load(m, at[LanePart.NEW_VELOCITY])))
-    flags[Flag.AT_CONTACT] = (flags[Flag.AT_CONTACT] & ~moved) | resolved
-    return scalar, captured, past
+        resolved, unsolved, captured = reset(lanes, hit)
+        doubtful |= unsolved
+    moved = lanes.busy & ~lanes.scalar & ~doubtful & ~waits
+    begin, v_begin = splat(0.0), lanes.velocity[0]
+    past = moved & bits(lanes.new_time > lanes.period_end)
+    if past and lanes.sizes.ends_asked > 0:
+        pass_ends(lanes, step, past)
+        begin = select(mask(past), lanes.period_end - lanes.now, begin)
+        v_begin = select(mask(past), lanes.ended_velocity[0], v_begin)
+    if lanes.sizes.extrema > 0:
+        x, v = lanes.new_position[0], lanes.new_velocity[0]
+        course = Course(begin, step.taken, v_begin, x, v, step.h, step.bend)
+        record_range(lanes, 0, course, moved)
+        record_others(lanes, step, past, moved)
+    commit(lanes, moved, resolved, absolute(lanes.new_velocity[0]))
+    lanes.at_contact = (lanes.at_contact & ~moved) | resolved
+    return doubtful, captured, past

@@ -5,27 +5,24 @@ Its compiled part goes into one module with that of `driver.py`.
 
 from __future__ import annotations
 
-from saltus.flow.kernel.memory_layout import SERIES_LENGTH, LanePart
-from saltus.flow.lanes.lane_layout import TOUCH, Helper
-from saltus.flow.lanes.lane_steps import guess_from_end, lane_value, only_root, root_move, shape
-from saltus.taylor import WIDTH, bits, fma, inline_jit, load, mask, maximum, rough_inverse, select, vector_lane, with_lane
+from saltus.flow.lanes.lane_steps import guess_from_end, only_root, root_move, series_value, shape
+from saltus.flow.lanes.memory import TOUCH
+from saltus.taylor import WIDTH, bits, fma, inline_jit, mask, maximum, one, rough_inverse, select, vector_lane, with_lane
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
 
 @inline_jit
-def meet(at, row, m, order, h, sign, start, end, bend, skip, alive, patient, helpers, space):
-    """The lanes in `alive` that meet a contact within the step, those in doubt, and those that wait for a shorter step; the
-    times, and the velocities at these times.
+def find_contact(lanes, gap, h, end, alive, patient):
+    """The lanes in `alive` that meet a contact within the step of length h, those in doubt, and those that wait for a shorter
+    step; the times, and the velocities at these times.
 
-    The contact is met where `sign` times a coordinate, measured from the contact, falls to 0. `start` is this coordinate at the
-    start of the step, `end` its position, velocity and acceleration at the end. `skip` are the lanes whose step starts at the
-    contact; `patient` are those that may wait for a shorter step if nothing is certain.
+    `end` are the coordinate at the end of the step, measured from the contact, its velocity and acceleration there, and the bound
+    of `sweep`. `patient` are the lanes that may wait for a shorter step if nothing is certain.
     """
-    x, v, _ = end
-    g0, first = sign * start, at[LanePart.POSITIONS] + row * SERIES_LENGTH
-    g1, g2 = sign * load(m, first + 1) * h, sign * load(m, first + 2) * (h * h)
-    cubic = (g0, g1, g2, sign * load(m, first + 3) * (h * h * h))
+    (x, v, _, bend), sign, skip, series = end, gap.sign, gap.skip, lanes.positions[gap.row]
+    g0, g1, g2 = sign * gap.start, sign * series[1] * h, sign * series[2] * (h * h)
+    cubic = (g0, g1, g2, sign * series[3] * (h * h * h))
     doubtful = ((bits(g0 <= 0.0) & ~skip) | (bits(g1 <= 0.0) & skip)) & alive
     clear, falls, concave, convex = shape(cubic, bend, skip)
     over = bits(sign * x <= 0.0)
@@ -39,23 +36,23 @@ def meet(at, row, m, order, h, sign, start, end, bend, skip, alive, patient, hel
         if hit & ~short:
             guess = guess_from_end(cubic, end, sign, h)
         if short:
-            higher = sign * load(m, first + 4) * (h * h) * (h * h), sign * load(m, first + 5) * (h * h) * (h * h * h)
+            higher = sign * series[4] * (h * h) * (h * h), sign * series[5] * (h * h) * (h * h * h)
             guess = select(mask(short), guess_from_start(cubic, higher, flight) * h, guess)
             high = select(mask(short), 2.0 * flight * h, h)
-        root, speed = only_root(m, at, row, order, start, sign, guess, high, hit)
+        root, speed = only_root(lanes, gap, guess, high, hit)
         tau, at_root = select(mask(hit), root, h), select(mask(hit), speed, v)
-    velocities = at[LanePart.VELOCITIES] + row * SERIES_LENGTH
     unclear = alive & ~doubtful & ~clear & ~single
     waits, unclear = unclear & patient, unclear & ~patient
-    for lane in range(WIDTH if unclear else 0):
-        if (unclear >> lane) & 1:
-            root = scalar_root(at, row, m, order, lane, h, sign, g0, (skip >> lane) & 1, helpers, space)
+    for i in range(WIDTH if unclear else 0):
+        if (unclear >> i) & 1:
+            lane = one(lanes, i)
+            root = lane_root(lane, gap, h)
             if root == TOUCH:
-                doubtful |= 1 << lane
+                doubtful |= 1 << i
             elif root >= 0.0:
-                hit |= 1 << lane
-                tau = with_lane(tau, lane, root)
-                at_root = with_lane(at_root, lane, lane_value(m, velocities, order, lane, root))
+                hit |= 1 << i
+                tau = with_lane(tau, i, root)
+                at_root = with_lane(at_root, i, series_value(lane.velocities[gap.row], lanes.sizes.order, root))
     return hit, doubtful, waits, tau, at_root
 
 
@@ -92,8 +89,8 @@ def guess_from_start(cubic, higher, flight):
 
 
 @inline_jit
-def scalar_root(at, row, m, order, lane, h, sign, g0, skip, helpers, space):
-    """The first root of one lane's gap, NO_ROOT or TOUCH, by the scalar kernel's search."""
-    step, gap_sign, start = vector_lane(h, lane), vector_lane(sign, lane), vector_lane(g0, lane)
-    search = helpers[Helper.FIRST_ROOT]
-    return search(m, at[LanePart.POSITIONS] + row * SERIES_LENGTH, order, lane, step, gap_sign, start, skip, space[0], space[1])
+def lane_root(lane, gap, h):
+    """The first root of one lane's gap, NO_ROOT or TOUCH, by the scalar kernel's search (`handoff.first_root_of`)."""
+    i, search = lane.index, lane.helpers.first_root
+    start, sign = vector_lane(gap.start, i), vector_lane(gap.sign, i)
+    return search(lane, gap.row, start, sign, vector_lane(h, i), (gap.skip >> i) & 1)

@@ -11,7 +11,6 @@ import numpy as np
 
 from saltus.checks import check_count
 from saltus.errors import ParameterError, near, shown
-from saltus.flow.lanes.threads import available_cores
 
 
 class Sample(StrEnum):
@@ -41,7 +40,7 @@ class Until(StrEnum):
 
 
 @dataclass(frozen=True)
-class Wanted:
+class EnsembleOptions:
     """What is to be computed: how exactly, for how long, and which samples are kept."""
 
     tol: float
@@ -110,6 +109,8 @@ def read_threads(threads: Any) -> int:
     ParameterError
         `threads` is no whole number from 1 on.
     """
+    from saltus.flow.lanes.threads import available_cores  # here, as reading a dataset needs no compiled code
+
     threads = available_cores() if threads is None else threads
     check_count("threads", threads, 1)
     return int(threads)

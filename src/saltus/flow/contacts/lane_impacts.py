@@ -1,0 +1,181 @@
+"""Impacts in lanes of a model with several contacts: one contact closes, alone or while others are closed.
+
+Its compiled part goes into one module with that of `contacts/lane_step.py`. The complementarity problem
+
+    v+ = v- + M^-1 sum_i s_i J_i,    0 <= J _|_ (v+ + E v-) >= 0
+
+is solved by trying an impulse at the contact that closes alone, then impulses at this and all closed contacts. Lanes in which
+neither is a solution are solved one at a time (`scalar_impact.py`).
+"""
+
+from __future__ import annotations
+
+from saltus.flow.contacts.layout import ContactColumn
+from saltus.flow.lanes.memory import Closing
+from saltus.taylor import absolute, bits, fma, inline_jit, lean_jit, mask, select, splat
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+
+@lean_jit
+def write_closed(lane, contacts):
+    """Tell the model's functions which coordinates of a lane are free; returns its closed contacts as bits."""
+    closed = 0
+    for d in range(lane.sizes.own):
+        lane.free[d] = 1.0
+    for i in range(contacts.shape[0]):
+        if contacts[i, ContactColumn.CLOSED] == 1:
+            closed |= 1 << i
+            lane.free[contacts[i, ContactColumn.COORDINATE]] = 0.0
+    return closed
+
+
+@lean_jit
+def read_contacts(lane, contacts):
+    """Fill the scalar kernel's rows of contacts for a lane that moves smoothly; a gap that has just opened may still be 0.
+
+    `WAITS` is kept: looking for the end of an accumulation too often could take as long as all its impacts.
+    """
+    closed = int(lane.side) - 1
+    for i in range(lane.sizes.contacts):
+        coordinate = lane.sizes.coordinates[i]
+        there = lane.position[coordinate] == lane.contacts[i]
+        contacts[i, ContactColumn.COORDINATE], contacts[i, ContactColumn.CLOSED] = coordinate, closed >> i & 1
+        contacts[i, ContactColumn.SKIP] = 1 if there and not closed >> i & 1 else 0
+        contacts[i, ContactColumn.RELEASED] = 0
+
+
+@inline_jit
+def closed_lanes(lanes, i):
+    """Bits of the lanes in which a contact is closed."""
+    row = lanes.sizes.coordinates[i]
+    start = lanes.position[row] - lanes.contacts[i]
+    return bits(lanes.free[row] < 0.5) & bits(start * start <= 0.0)
+
+
+@inline_jit
+def closing_lanes(closing, i):
+    """Bits of the lanes in which contact i is the one that closes."""
+    return closing.hit & bits(absolute(closing.contact - 1.0 * i) < 0.5)
+
+
+@inline_jit
+def acting_lanes(lanes, closing, i):
+    """Bits of the lanes in which contact i has an impulse."""
+    acts = closing_lanes(closing, i)
+    return acts | (closed_lanes(lanes, i) & closing.hit) if closing.together else acts
+
+
+@inline_jit
+def aim(lanes, closing, i):
+    """The rate -E v- of a contact's gap after the impact, if the contact has an impulse."""
+    count, factor = lanes.sizes.contacts, splat(0.0)
+    for j in range(count):
+        factor = select(mask(closing_lanes(closing, j)), lanes.restitution[count * i + j], factor)
+    return factor * closing.speed
+
+
+@lean_jit
+def resolve_impacts(lanes, hit, which):
+    """Apply the impact law in the lanes in `hit`, where the contact `which` closes, at the new state; returns the resolved lanes.
+
+    Lanes are not resolved, and unchanged, if the speeds that are left are so small that an accumulation may end, or all 0.
+    """
+    speed, matrices = splat(0.0), lanes.code.impact
+    matrices(lanes.memory)
+    for i in range(lanes.sizes.contacts):
+        rate = (1.0 * lanes.sizes.signs[i]) * lanes.new_velocity[lanes.sizes.coordinates[i]]
+        speed = select(mask(hit & bits(absolute(which - 1.0 * i) < 0.5)), -rate, speed)
+    lanes.new_speed = speed
+    resolved, left = 0, hit & bits(speed > 0.0)
+    for together in range(2):
+        if left:
+            closing = Closing(left, which, speed, together)
+            give_impulses(lanes, closing)
+            accepted = left & impulses_hold(lanes, closing)
+            take_impulses(lanes, Closing(accepted, which, speed, together))
+            resolved |= accepted
+            left &= ~accepted
+    return resolved
+
+
+@lean_jit
+def give_impulses(lanes, closing):
+    """Solve for the jumps of all velocities: those at the acting contacts are given, and no impulse acts on the others."""
+    own, free, jump, matrix = lanes.sizes.own, lanes.impulse_free, lanes.jump, lanes.matrix
+    for row in range(own):
+        free[row], jump[row] = splat(1.0), splat(0.0)
+    for i in range(lanes.sizes.contacts):
+        row, acts = lanes.sizes.coordinates[i], mask(acting_lanes(lanes, closing, i))
+        after = (1.0 * lanes.sizes.signs[i]) * aim(lanes, closing, i)
+        free[row] = select(acts, splat(0.0), free[row])
+        jump[row] = select(acts, after - lanes.new_velocity[row], jump[row])
+    for row in range(own):
+        known, here = splat(0.0), free[row]
+        for column in range(own):
+            entry = lanes.mass[own * row + column]
+            known = fma(entry, jump[column] * (1.0 - free[column]), known)
+            diagonal = 1.0 - here if row == column else splat(0.0)
+            matrix[own * row + column] = fma(entry, here * free[column], diagonal)
+        jump[row] = select(mask(bits(here > 0.5)), -known, jump[row])
+    eliminate_in_lanes(matrix, jump, own)
+
+
+@lean_jit
+def eliminate_in_lanes(matrix, right, size):
+    """Solve a linear system in place, without pivoting, which a positive definite matrix does not need."""
+    for k in range(size):
+        inverse = 1.0 / matrix[size * k + k]
+        for row in range(k + 1, size):
+            factor = matrix[size * row + k] * inverse
+            for column in range(k + 1, size):
+                entry = matrix[size * row + column]
+                matrix[size * row + column] = fma(-factor, matrix[size * k + column], entry)
+            right[row] = fma(-factor, right[k], right[row])
+    for k in range(size - 1, -1, -1):
+        value = right[k]
+        for column in range(k + 1, size):
+            value = fma(-matrix[size * k + column], right[column], value)
+        right[k] = value / matrix[size * k + k]
+
+
+@lean_jit
+def impulses_hold(lanes, closing):
+    """Bits of the lanes in which the jumps solve the problem, no slow speed is left, and some coordinate is free afterwards."""
+    own, jump, good, freed = lanes.sizes.own, lanes.jump, closing.hit, splat(1.0 * lanes.sizes.own)
+    for i in range(lanes.sizes.contacts):
+        row, aimed, sign = lanes.sizes.coordinates[i], aim(lanes, closing, i), 1.0 * lanes.sizes.signs[i]
+        concerned = closing_lanes(closing, i) | (closed_lanes(lanes, i) & closing.hit)
+        acts, impulse = acting_lanes(lanes, closing, i), splat(0.0)
+        for column in range(own):
+            impulse = fma(lanes.mass[own * row + column], jump[column], impulse)
+        rate = select(mask(acts), aimed, sign * jump[row])
+        lanes.rates[i] = rate
+        solved = (acts & bits(sign * impulse >= 0.0)) | (concerned & ~acts & bits(rate >= aimed))
+        stays = bits(rate * rate <= 0.0)
+        good &= (solved & (stays | bits(rate > lanes.settings.slowest_impact))) | ~concerned
+        freed = select(mask(concerned & stays), freed - 1.0, freed)
+    return good & bits(freed > 0.5)
+
+
+@lean_jit
+def take_impulses(lanes, closing):
+    """Put the state after the impact, and the closed contacts, into the lanes of `closing`."""
+    chosen, side = mask(closing.hit), splat(1.0)
+    for row in range(lanes.sizes.own):
+        after = lanes.new_velocity[row] + lanes.jump[row]
+        lanes.after_position[row] = select(chosen, lanes.new_position[row], lanes.after_position[row])
+        lanes.after_velocity[row] = select(chosen, after, lanes.after_velocity[row])
+    for i in range(lanes.sizes.contacts):  # all contacts before `free` changes: it still says which were closed
+        concerned = closing_lanes(closing, i) | (closed_lanes(lanes, i) & closing.hit)
+        stays = mask(concerned & bits(absolute(lanes.rates[i]) <= 0.0))
+        side = select(stays, side + 1.0 * (1 << i), side)
+        lanes.stays[i] = select(stays, splat(1.0), splat(0.0))
+        row, rate = lanes.sizes.coordinates[i], (1.0 * lanes.sizes.signs[i]) * lanes.rates[i]
+        lanes.after_velocity[row] = select(mask(acting_lanes(lanes, closing, i)), rate + 0.0, lanes.after_velocity[row])
+    for row in range(lanes.sizes.own):
+        lanes.free[row] = select(chosen, splat(1.0), lanes.free[row])
+    for i in range(lanes.sizes.contacts):
+        row, stays = lanes.sizes.coordinates[i], mask(closing.hit & bits(lanes.stays[i] > 0.5))
+        lanes.free[row] = select(stays, splat(0.0), lanes.free[row])
+    lanes.new_side = select(chosen, side, lanes.new_side)

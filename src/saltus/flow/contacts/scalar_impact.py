@@ -1,0 +1,58 @@
+"""An impact of one lane of a model with several contacts, where all lanes together cannot resolve it.
+
+Its compiled part goes into one module with that of `lanes/handoff.py`; the driver calls it through a pointer.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from saltus.flow.contacts.impacts import closed_bits, couple, impact_impulses, push, settle_contact
+from saltus.flow.contacts.lane_handoff import functions_of
+from saltus.flow.contacts.lane_impacts import read_contacts, write_closed
+from saltus.flow.contacts.layout import ContactColumn
+from saltus.flow.kernel.memory import LaneImpactParts, MotionMemory
+from saltus.flow.kernel.steps import state_arrays
+from saltus.flow.lanes.function_types import CONTACTS_IMPACT
+from saltus.flow.lanes.handoff import own_env
+from saltus.taylor import by_reference, cached_jit
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+
+@cached_jit(CONTACTS_IMPACT)
+def contacts_impact(lane, hit):
+    """Apply the impact law to a lane at its new state, where the contacts in `hit` close; returns 1 if that was enough.
+
+    Otherwise it returns 0 and leaves the lane unchanged, for the scalar kernel to take over: where the law has no solution, where
+    the remaining speeds are so small that an accumulation may end, and where everything is at rest.
+    """
+    (array, state, contacts, solver), own, env = lane.impact_space, lane.sizes.own, own_env(lane)
+    numbers, rates, speed = array[0], solver.rates, np.inf
+    numbers.dof, numbers.own, numbers.piece = own, own, lane.piece
+    parts = LaneImpactParts(state_arrays(numbers, state), env, env[0], functions_of(lane), contacts, solver)
+    motion = by_reference(MotionMemory(numbers, parts))
+    for row in range(2 * own):  # velocities follow the positions in both memories
+        state[row] = lane.new_position[row]
+    read_contacts(lane, contacts)
+    regular, chosen = couple(motion), hit | closed_bits(motion)
+    for i in range(contacts.shape[0]):
+        if hit >> i & 1:
+            speed = min(speed, -rates[i])
+    if not regular or not speed > 0.0 or impact_impulses(motion, chosen, rates) < 0:
+        return 0
+    push(motion)
+    free = (1 << own) - 1
+    for i in range(contacts.shape[0]):
+        if chosen >> i & 1:
+            settle_contact(motion, i, rates[i])
+            if rates[i] == 0.0:
+                free &= ~(1 << contacts[i, ContactColumn.COORDINATE])
+            elif rates[i] <= lane.settings.slowest_impact:
+                return 0
+    if free == 0:
+        return 0
+    lane.new_speed, lane.new_side = speed, 1.0 + write_closed(lane, contacts)
+    for row in range(2 * own):
+        lane.after_position[row] = state[row]
+    return 1

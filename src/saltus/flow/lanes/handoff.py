@@ -1,0 +1,182 @@
+"""The scalar kernel's part in a group of lanes, one lane at a time, through pointers: roots and extrema where the bounds for all
+lanes leave them open, and rare events (rest, slow impacts that may accumulate, touches, limits), through which it moves a lane.
+
+Its compiled part goes into one module with that of `one_contact/lane_handoff.py`, or of `contacts/lane_handoff.py`. If it were
+linked into its callers, it would be compiled again with each of them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from saltus.flow.kernel.layout import Mode, Status
+from saltus.flow.kernel.memory import MOTION, EventBuffers, StepBuffers
+from saltus.flow.kernel.roots import SIMPLE, first_root, horner, scale_gap
+from saltus.flow.lanes.function_types import LANE_ROOT, SCALAR_MOTION, TURNING_RANGE
+from saltus.flow.lanes.memory import NO_ROOT, TOUCH
+from saltus.flow.one_contact.lane_handoff import begin_scalar, end_scalar, event_numbers, functions_of, is_captured, record_events
+from saltus.taylor import cached_jit, jit, lean_jit, own_records
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+MOST_TURNS = 16  # the most turning points that are looked for within one step
+BUFFER_LENGTH = 64  # steps, and events, of one call
+
+
+# --- roots and extrema -----------------------------------------------------------------------------------------------------
+
+
+@cached_jit(LANE_ROOT)
+def first_root_of(lane, row, start, sign, h, skip):
+    """The first root of one lane's gap by `roots.first_root`: its time, NO_ROOT, or TOUCH where it touches zero before.
+
+    The gap is `sign` times coordinate `row`, measured from the contact: `start` at the start of the step. If `skip` is 1, the
+    step starts at the contact.
+    """
+    series, order, gap, poly = lane.positions[row], lane.sizes.order, lane.gap, lane.polynomial
+    for k in range(1, order + 1):
+        gap[k] = sign * series[k]
+    gap[0] = sign * start
+    scale_gap(gap, skip, order, h, poly)
+    kind, u, touch = first_root(poly, order - skip)
+    if touch <= 1.0:
+        return TOUCH
+    return u * h if kind == SIMPLE else NO_ROOT
+
+
+@lean_jit
+def shift_start(p, n, u):
+    """Replace p(s) by p(u + (1 - u) s)."""
+    for k in range(n):
+        for j in range(n - 1, k - 1, -1):
+            p[j] += u * p[j + 1]
+    power = 1.0
+    for k in range(n + 1):
+        p[k] *= power
+        power *= 1.0 - u
+
+
+@cached_jit(TURNING_RANGE)
+def turning_range(q, order, begin, h, p):
+    """The largest and the smallest value of a series on (begin, h], at its end or where its derivative vanishes before."""
+    high = low = horner(q, order, h)
+    n, power = order - 1, 1.0
+    for k in range(order):
+        p[k] = (k + 1) * q[k + 1] * power
+        power *= h
+    start, left = begin / h, 1.0 - begin / h
+    if begin > 0.0:
+        shift_start(p, n, start)
+    for _ in range(MOST_TURNS):
+        while n > 0 and p[0] == 0.0:
+            for k in range(n):
+                p[k] = p[k + 1]
+            n -= 1
+        if p[0] < 0.0:
+            for k in range(n + 1):
+                p[k] = -p[k]
+        kind, u, _ = first_root(p, n)
+        if kind != SIMPLE or u >= 1.0:
+            break
+        start, left = start + u * left, (1.0 - u) * left
+        x = horner(q, order, start * h)
+        high, low = max(high, x), min(low, x)
+        shift_start(p, n, u)
+        p[0] = 0.0
+    return high, low
+
+
+# --- rare events -----------------------------------------------------------------------------------------------------------
+
+
+@jit
+def scalar_state(lane):
+    """The scalar kernel's memory for a lane: an array of one record MOTION, and the state (see `kernel/memory.py`)."""
+    numbers, sizes = np.zeros(1, dtype=MOTION), lane.sizes
+    motion, state = numbers[0], np.zeros(2 * sizes.rows + sizes.columns)
+    period, length, last = int(lane.period), lane.period_length, lane.last_period
+    motion.period = motion.last_period = period
+    motion.mode, motion.rested, motion.side, motion.piece = lane.mode, lane.held, int(lane.side), lane.piece
+    motion.leave_by = lane.leave_by
+    motion.skip = (lane.at_contact >> lane.index) & 1 if lane.mode == Mode.ARC else lane.skip
+    motion.order, motion.dense, motion.until_smooth = sizes.scalar_order, sizes.extrema, 1
+    motion.dof, motion.margin_count, motion.workspace_rows = sizes.rows, sizes.margins, sizes.workspace
+    motion.sides, motion.checked, motion.own, motion.columns = sizes.sides, sizes.checked, sizes.own, sizes.columns
+    motion.time, motion.chatter_speed = lane.now, lane.chatter_speed
+    for row in range(2 * sizes.rows):  # in both memories velocities follow the positions
+        state[row] = lane.position[row]
+    motion.period_length, motion.tolerance = length, lane.settings.tolerance
+    motion.end = lane.end_time if period == last else lane.period_start + length
+    motion.horizon = (last - period) * length + lane.end_time
+    return numbers, state
+
+
+@jit
+def own_env(lane):
+    """The scalar kernel's `env` for a lane."""
+    trajectory = lane.trajectory
+    breaks, table = own_records(lane.work.tables, trajectory)
+    return lane.work.parameters[trajectory], lane.constants_of[lane.index], breaks, table
+
+
+@jit
+def buffers(motion, numbers):
+    """Buffers for steps, and for events of so many numbers before their shifts."""
+    steps = StepBuffers(
+        np.empty((BUFFER_LENGTH, 2), np.int64),
+        np.empty((BUFFER_LENGTH, 2)),
+        np.empty((BUFFER_LENGTH, motion.own, motion.order + 2)),
+    )
+    return steps, EventBuffers(np.empty((BUFFER_LENGTH, 4), np.int64), np.empty((BUFFER_LENGTH, numbers + motion.columns)))
+
+
+@lean_jit
+def record_extrema(lane, motion, steps):
+    """Record the extrema of the scalar kernel's last call, and forget its steps and events."""
+    for i in range(motion.recorded_steps):
+        for row in range(motion.own):
+            series, h = steps.step_series[i, row], steps.step_spans[i, 1]
+            above, below = turning_range(series, motion.order, 0.0, h, lane.polynomial)
+            lane.highest, lane.lowest = max(lane.highest, above), min(lane.lowest, below)
+    motion.recorded_steps = motion.recorded_events = 0
+
+
+@lean_jit
+def put_state(lane, motion, state):
+    """Put the scalar kernel's state into the lane."""
+    rows, bit = lane.sizes.rows, 1 << lane.index
+    lane.mode, lane.held, lane.skip, lane.piece = motion.mode, motion.rested, motion.skip, motion.piece
+    lane.now, lane.side = motion.time, float(motion.side)
+    for row in range(2 * rows):
+        lane.position[row] = state[row]
+    for j in range(motion.columns):  # the shifts of the last event, for `finish`
+        lane.after_position[j] = state[2 * rows + j]
+    lane.chatter_speed = motion.chatter_speed if motion.mode == Mode.CHATTER else 0.0
+    arc = motion.mode == Mode.ARC and motion.skip <= 1
+    lane.scalar = lane.scalar & ~bit if arc else lane.scalar | bit
+    lane.at_contact = lane.at_contact | bit if arc and motion.skip == 1 else lane.at_contact & ~bit
+
+
+@cached_jit(SCALAR_MOTION)
+def scalar_motion(lane):
+    """Move a lane by the scalar kernel until it moves smoothly again, or its forcing period or its motion ends.
+
+    Returns (PAUSED, 0), or why the motion ends and which margin reached zero.
+    """
+    advance, _ = lane.kernel
+    numbers, state = scalar_state(lane)
+    motion, rows, env, functions = numbers[0], lane.contact_rows[lane.index], own_env(lane), functions_of(lane)
+    begin_scalar(lane)
+    steps, events = buffers(motion, event_numbers(lane))
+    while True:
+        status = advance(numbers, state, env, functions, rows, (steps, events))
+        detail = record_events(lane, motion, events)
+        record_extrema(lane, motion, steps)
+        many = lane.impacts > lane.next_check  # then the driver checks their number
+        if (status != Status.FULL and status != Status.PAUSED) or many or lane.work.control[0] != 0:
+            break
+    put_state(lane, motion, state)
+    end_scalar(lane, motion)
+    if status in (Status.DONE, Status.SMOOTH, Status.FULL, Status.PAUSED):
+        return Status.CAPTURED if is_captured(lane, motion, state) else Status.PAUSED, 0
+    return status, detail
