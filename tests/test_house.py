@@ -50,7 +50,7 @@ MAY_IMPORT = {
     "config": {"systems", "flow", "attractors", "sweep", "studies"},
     "cli": {"systems", "theory", "flow", "taylor", "orbits", "attractors", "sweep", "studies", "plots", "config"},
 }
-TEXTS = {f"saltus.taylor.{name}" for name in ("lane_vectors", "load_tables", "vectors")}  # parts of the lanes' kernels
+TEXTS = {f"saltus.taylor.{name}" for name in ("lane_memory", "lane_vectors", "load_tables", "vectors")}  # of the lanes
 HEAVY = (
     *("scipy", "numba", "xarray", "matplotlib", "h5netcdf", "zarr", "distributed"),
     *("saltus.flow", "saltus.sweep", "saltus_paper"),

@@ -16,7 +16,7 @@ from saltus.flow.contacts.layout import ContactColumn, FrictionColumn
 from saltus.flow.kernel.layout import Mode
 from saltus.flow.lanes.gap_roots import find_contact
 from saltus.flow.lanes.lane_steps import both_at, commit, natural_step, row_step, series_true, state_size, sweep
-from saltus.flow.lanes.memory import FAST, Course, Gap, Step
+from saltus.flow.lanes.memory import FAST, Gap, Step, Stretch
 from saltus.flow.lanes.sampling import keep_ended, pass_ends, record_others, record_range
 from saltus.taylor import (
     ALL,
@@ -243,7 +243,7 @@ def pass_ends_of_free(lanes, step, past):
         lanes.ended_position[row] = select(chosen, select(was_free, x, lanes.position[row]), lanes.ended_position[row])
         lanes.ended_velocity[row] = select(chosen, select(was_free, v, splat(0.0)), lanes.ended_velocity[row])
     if lanes.sizes.extrema > 0:
-        record_range(lanes, 0, Course(splat(0.0), since, lanes.free_velocity, x, v, step.h, step.bend), past)
+        record_range(lanes, 0, Stretch(splat(0.0), since, lanes.free_velocity, x, v, step.h, step.bend), past)
     keep_ended(lanes, past)
 
 
@@ -305,9 +305,9 @@ def record_step(lanes, step, single, past, moved):
     if single:  # held coordinates are constant, and the records of the period begin with them
         v_begin = select(after, of_free(lanes, lanes.ended_velocity, step.contact), lanes.free_velocity)
         x, v = of_free(lanes, lanes.new_position, step.contact), of_free(lanes, lanes.new_velocity, step.contact)
-        record_range(lanes, 0, Course(begin, tau, v_begin, x, v, step.h, step.bend), moved)
+        record_range(lanes, 0, Stretch(begin, tau, v_begin, x, v, step.h, step.bend), moved)
     else:
         v_begin = select(after, lanes.ended_velocity[0], lanes.velocity[0])
         x, v = lanes.new_position[0], lanes.new_velocity[0]
-        record_range(lanes, 0, Course(begin, tau, v_begin, x, v, step.h, step.bend), moved)
+        record_range(lanes, 0, Stretch(begin, tau, v_begin, x, v, step.h, step.bend), moved)
         record_others(lanes, step, past, moved)

@@ -60,7 +60,7 @@ import numpy as np
 from saltus.flow.kernel.memory import *
 from saltus.flow.lanes import function_types
 from saltus.flow.lanes.function_types import *
-from saltus.flow.lanes.memory import Closing, Course, Gap, Step
+from saltus.flow.lanes.memory import Closing, Stretch, Gap, Step
 from saltus.taylor.lane_memory import one
 from saltus.taylor.lane_vectors import *
 from saltus.taylor.numba_types import by_reference

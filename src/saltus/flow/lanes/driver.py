@@ -138,5 +138,5 @@ def run_all(lanes):
 
 @cached_jit(RUN_LANES, nogil=True)
 def run_lanes(group):
-    """Run all jobs of a group, a tuple `Group` (`memory.py`)."""
+    """Run all jobs of a group, a tuple `LaneGroup` (`memory.py`)."""
     run_all(shared(group))

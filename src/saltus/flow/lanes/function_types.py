@@ -29,11 +29,11 @@ from saltus.flow.lanes.memory import (
     ROW,
     SERIES,
     Code,
-    Group,
     Helpers,
+    LaneGroup,
     LaneSettings,
+    LaneSizes,
     Parts,
-    Sizes,
     Slots,
     Work,
 )
@@ -53,7 +53,7 @@ LANE_IMPACT = LANE_FIELD = types.void(_f1)
 TURNING_RANGE = types.UniTuple(_f, 2)(_f1, _i, _f, _f, _f1)
 TABLES = types.Tuple((_f2, _f4))
 _LIMITS = types.Tuple((_f, _f, _f, types.UniTuple(_f, 4)))
-_SIZES = named_tuple(Sizes, *(21 * (_i,)), _i1, _i1)
+_SIZES = named_tuple(LaneSizes, *(21 * (_i,)), _i1, _i1)
 _SETTINGS = named_tuple(LaneSettings, _f, _f, _f, _LIMITS, _LIMITS)
 _WORK = named_tuple(Work, _f2, _records(JOB), _f2, TABLES, _f2, _records(END), _f2, _f3, _i1)
 _SOLVER = named_tuple(SolverArrays, _f1, *4 * (_f2,), *12 * (_f1,), _f2)
@@ -82,7 +82,7 @@ def _lane_types(name: str, code: Any, kernel: Any, several: bool) -> LaneTypes:
     helpers: list[Any] = [function_type(signature) for signature in (root, TURNING_RANGE, motion, impact)[: 4 if several else 3]]
     helpers += [] if several else [types.none]
     group = named_tuple(
-        Group,
+        LaneGroup,
         *(_f1, _i1, _SIZES, _SETTINGS, named_tuple(Code, *code), named_tuple(Helpers, *helpers), kernel),
         *(_records(FLAGS), _records(ROW), _f2, _f2, _f3, _i2, _i3, _f1, _f1, space, _WORK),
     )

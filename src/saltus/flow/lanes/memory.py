@@ -1,8 +1,8 @@
 """The memory of a group of lanes in words: the named tuples and records that the driver and its callers share.
 
-A `Group` is all that the driver needs: its `memory` consists of slots of one vector, with a number for each lane. The first slots
-are those of `Slots`; the parts of `Parts` follow, each with as many slots as the structure needs. Compiled code reads and writes
-all of them by their names (see `taylor/lane_memory.py`): `lanes.now`, `lanes.position[row]`, `lane.impacts`.
+A `LaneGroup` is all that the driver needs: its `memory` consists of slots of one vector, with a number for each lane. The first
+slots are those of `Slots`; the parts of `Parts` follow, each with as many slots as the structure needs. Compiled code reads and
+writes all of them by their names (see `taylor/lane_memory.py`): `lanes.now`, `lanes.position[row]`, `lane.impacts`.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ class MemoryPlan:
         return self.places.margins + self.stops * SERIES_LENGTH
 
 
-class Sizes(NamedTuple):
+class LaneSizes(NamedTuple):
     """Numbers of a structure and of a call."""
 
     own: int  # the model's own coordinates
@@ -247,12 +247,12 @@ class Work(NamedTuple):
     control: np.ndarray  # whether to stop, forcing periods done so far
 
 
-class Group(NamedTuple):
+class LaneGroup(NamedTuple):
     """A group of lanes."""
 
     memory: np.ndarray
     places: np.ndarray  # the `Parts`
-    sizes: Sizes
+    sizes: LaneSizes
     settings: LaneSettings
     code: Code
     helpers: Helpers
@@ -288,7 +288,7 @@ class Step(NamedTuple):
     contact: Any  # with several contacts, the number of the one that closes, or whose coordinate is free
 
 
-class Course(NamedTuple):
+class Stretch(NamedTuple):
     """The motion of a coordinate from `begin` to `end` in a step, for the record of its extrema."""
 
     begin: Any

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.flow.lanes.lane_steps import both_at, motion_at, sweep
-from saltus.flow.lanes.memory import LONGEST_RECURRENCE, Course
+from saltus.flow.lanes.memory import LONGEST_RECURRENCE, Stretch
 from saltus.taylor import (
     WIDTH,
     absolute,
@@ -35,10 +35,10 @@ MOST_MOVES = 60  # steps of Newton's method to a turning point: more than bisect
 
 
 @lean_jit
-def turning_value(lanes, row, course, chosen):
+def turning_value(lanes, row, stretch, chosen):
     """The position at which the velocity vanishes, if it is monotonic and has different signs at the ends."""
-    low, high, v_low = course.begin, course.end, course.v_begin
-    span, tau = high - low, low + (high - low) * (v_low / (v_low - course.v))
+    low, high, v_low = stretch.begin, stretch.end, stretch.v_begin
+    span, tau = high - low, low + (high - low) * (v_low / (v_low - stretch.v))
     active, start, value = chosen, lanes.positions[row][0], splat(0.0)
     for _ in range(MOST_MOVES):
         x, v, a, jerk = motion_at(lanes, row, start, tau)
@@ -58,19 +58,19 @@ def turning_value(lanes, row, course, chosen):
 
 
 @inline_jit
-def bounds_of(lanes, row, course):
-    """Properties that a coordinate certainly has from the start of the step to the end of its course, from the first six terms of
-    its series and a bound of the others.
+def bounds_of(lanes, row, stretch):
+    """Properties that a coordinate certainly has from the start of the step to the end of its stretch, from six terms of its
+    series and a bound of the others.
 
     Returns bits of the lanes in which the velocity is monotonic, bits of those in which it keeps its sign, and upper and lower
     bounds of the coordinate, all by Bernstein coefficients.
     """
-    series, end, bend = lanes.positions[row], course.end, course.bend
+    series, end, bend = lanes.positions[row], stretch.end, stretch.bend
     square = end * end
     cube = square * end
     g0, g1, g2, g3 = series[0], series[1] * end, series[2] * square, series[3] * cube
     g4, g5 = series[4] * (square * square), series[5] * (square * cube)
-    ratio = end / course.h
+    ratio = end / stretch.h
     shrunk = ratio * ratio
     rest = bend * (shrunk * shrunk)
     rest = fma(maximum(rest - 12.0 * absolute(g4) - 20.0 * absolute(g5), splat(0.0)), shrunk, ROUNDED * rest)
@@ -92,8 +92,8 @@ def bounds_of(lanes, row, course):
 
 
 @lean_jit
-def record_range(lanes, row, course, chosen):
-    """Update `highest` and `lowest` with the extrema of a coordinate in its course, in chosen lanes.
+def record_range(lanes, row, stretch, chosen):
+    """Update `highest` and `lowest` with the extrema of a coordinate in its stretch, in chosen lanes.
 
     Lanes are skipped in forcing periods that are not recorded, and if the coordinate certainly stays between the recorded values.
     If the velocity is certainly monotonic, the extremum within the step is where it vanishes. If it is neither certainly
@@ -103,19 +103,19 @@ def record_range(lanes, row, course, chosen):
     if chosen == 0:
         return
     high, low = lanes.highest, lanes.lowest
-    top, bottom = maximum(high, course.x), minimum(low, course.x)
-    monotonic, one_sign, above, below = bounds_of(lanes, row, course)
+    top, bottom = maximum(high, stretch.x), minimum(low, stretch.x)
+    monotonic, one_sign, above, below = bounds_of(lanes, row, stretch)
     open_ = chosen & ~one_sign & (bits(above > top) | bits(below < bottom))
-    turns = bits(course.v_begin * course.v < 0.0) & monotonic & open_
+    turns = bits(stretch.v_begin * stretch.v < 0.0) & monotonic & open_
     if turns:
-        turning = turning_value(lanes, row, course, turns)
+        turning = turning_value(lanes, row, stretch, turns)
         top, bottom = select(mask(turns), maximum(top, turning), top), select(mask(turns), minimum(bottom, turning), bottom)
     lanes.highest = select(mask(chosen), top, high)
     lanes.lowest = select(mask(chosen), bottom, low)
     unclear = open_ & ~monotonic
     for i in range(WIDTH if unclear else 0):
         if (unclear >> i) & 1:
-            record_turns(one(lanes, i), row, vector_lane(course.begin, i), vector_lane(course.end, i))
+            record_turns(one(lanes, i), row, vector_lane(stretch.begin, i), vector_lane(stretch.end, i))
 
 
 @lean_jit
@@ -138,7 +138,7 @@ def record_others(lanes, step, past, chosen):
         _, _, _, bend = sweep(lanes, row, step.h)
         v_begin = select(mask(past), lanes.ended_velocity[row], lanes.velocity[row])
         x, v = lanes.new_position[row], lanes.new_velocity[row]
-        record_range(lanes, row, Course(begin, step.taken, v_begin, x, v, step.h, bend), chosen)
+        record_range(lanes, row, Stretch(begin, step.taken, v_begin, x, v, step.h, bend), chosen)
 
 
 @lean_jit
@@ -158,7 +158,7 @@ def pass_ends(lanes, step, past):
         if row > 0:
             _, _, _, bend = sweep(lanes, row, step.h)
         x, v = lanes.ended_position[row], lanes.ended_velocity[row]
-        record_range(lanes, row, Course(splat(0.0), since, lanes.velocity[row], x, v, step.h, bend), past)
+        record_range(lanes, row, Stretch(splat(0.0), since, lanes.velocity[row], x, v, step.h, bend), past)
     keep_ended(lanes, past)
 
 

@@ -27,11 +27,11 @@ from saltus.flow.lanes.memory import (
     LONGEST_RECURRENCE,
     ROW,
     Code,
-    Group,
     Helpers,
+    LaneGroup,
     LaneSettings,
+    LaneSizes,
     MemoryPlan,
-    Sizes,
     Work,
 )
 from saltus.progress import Progress, silent
@@ -196,7 +196,7 @@ class Lanes:
                 return
             self._run_chunk(group, jobs, ends, rows)
 
-    def _run_chunk(self, group: Group, jobs: Jobs, ends: Ends, rows: slice) -> None:
+    def _run_chunk(self, group: LaneGroup, jobs: Jobs, ends: Ends, rows: slice) -> None:
         states = np.ascontiguousarray(jobs.states[rows])
         parameters = np.tile(self.parameters, (len(states), 1))
         for place, column in jobs.columns.items():
@@ -217,13 +217,13 @@ class Lanes:
         load_driver(self.several)(group._replace(work=work))
         ends.samples[rows] = samples[:, :, self.sampled]
 
-    def _group(self, control: np.ndarray) -> Group:
+    def _group(self, control: np.ndarray) -> LaneGroup:
         """A group of lanes for one thread, still without work; `control` = [whether to stop, forcing periods done so far]."""
         trace, own, plan = self.program.trace, self.own, self.plan
         contacts, frictions = len(trace.signs), len(trace.rubbed)
         numbers = own * own + contacts * contacts + contacts + frictions if self.several else 3
         nothing = np.zeros((0, 0))
-        return Group(
+        return LaneGroup(
             memory=self._memory(),
             places=np.array(plan.places, dtype=np.int64),
             sizes=self._sizes(),
@@ -251,10 +251,10 @@ class Lanes:
         rows = np.zeros((contacts, ContactColumn.WAITS + 1), dtype=np.int64)
         return np.zeros(1, dtype=MOTION), np.zeros(2 * own), rows, solver_arrays(own, contacts, 0, len(trace.rubbed))
 
-    def _sizes(self) -> Sizes:
+    def _sizes(self) -> LaneSizes:
         """The numbers of the structure, and of what is asked for."""
         sizes, trace, plan = self.program.structure.sizes, self.program.trace, self.plan
-        return Sizes(
+        return LaneSizes(
             own=sizes.own,
             rows=sizes.dof,
             columns=sizes.columns,

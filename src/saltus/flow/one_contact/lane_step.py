@@ -8,7 +8,7 @@ from __future__ import annotations
 from saltus.flow.kernel.layout import CHATTER_SPEED, LOSSLESS
 from saltus.flow.lanes.gap_roots import find_contact
 from saltus.flow.lanes.lane_steps import both_at, commit, margins_certain, natural_step, series_true, state_size, sweep
-from saltus.flow.lanes.memory import FAST, SMALLEST_SHARE, Course, Gap, Step
+from saltus.flow.lanes.memory import FAST, SMALLEST_SHARE, Gap, Step, Stretch
 from saltus.flow.lanes.sampling import pass_ends, record_others, record_range
 from saltus.flow.one_contact.sides import side_of_state
 from saltus.taylor import absolute, bits, fma, inline_jit, lean_jit, mask, minimum, select, splat
@@ -119,8 +119,8 @@ def step_all(lanes):
         v_begin = select(mask(past), lanes.ended_velocity[0], v_begin)
     if lanes.sizes.extrema > 0:
         x, v = lanes.new_position[0], lanes.new_velocity[0]
-        course = Course(begin, step.taken, v_begin, x, v, step.h, step.bend)
-        record_range(lanes, 0, course, moved)
+        stretch = Stretch(begin, step.taken, v_begin, x, v, step.h, step.bend)
+        record_range(lanes, 0, stretch, moved)
         record_others(lanes, step, past, moved)
     commit(lanes, moved, resolved, absolute(lanes.new_velocity[0]))
     lanes.at_contact = (lanes.at_contact & ~moved) | resolved
