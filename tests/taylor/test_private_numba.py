@@ -1,18 +1,21 @@
 """What is private of numba: where it is missing, and on the oldest and the newest numba that pyproject.toml allows."""
 
+import ast
 import json
 import os
 import re
 import subprocess
 import sys
+import threading
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 
 import numba
 import pytest
 
 import saltus
-from saltus.taylor import cache_directory, load_module
+from saltus.taylor import cache_directory, entry_point, load_module, pointer, private_numba
 
 SOURCE = Path(saltus.__file__).parents[1]
 SYSTEM = """
@@ -162,3 +165,91 @@ def test_a_function_is_called_through_its_address_without_a_line_of_python():
     result = subprocess.run([sys.executable, "-c", CALLED], capture_output=True, text=True, check=True)
     assert json.loads(result.stdout) == [False, 81.0, 81.0]
     assert not result.stderr
+
+
+CALLER = """
+from saltus.taylor.numba_types import function_type
+@cached_jit(float64(function_type(float64(float64)), float64))
+def call(f, x):
+    return f(f(x))
+"""
+PARTS = {  # and the methods of each that are called, or replaced in a class that inherits from it
+    "rtsys": ["initialize"],
+    "FunctionCache": ["__init__", "_load_overload", "_guard_against_spurious_io_errors"],
+    "IndexDataCacheFile": ["__init__", "_load_index", "_load_data", "_open_for_write"],
+    "NativeLowering": [],
+    "JITCodeLibrary": ["__init__", "add_ir_module", "_get_module_for_linking"],
+    "register_pass": [],
+    "CompilerBase": ["__init__", "compile_extra"],
+    "DefaultPassBuilder": ["define_nopython_pipeline"],
+}
+CHANGES = [(part, how) for part, methods in PARTS.items() for how in ("absent", "a function", *methods)]
+
+
+@pytest.fixture
+def unused(tmp_path, monkeypatch):
+    """numba as if saltus had not used it yet, with an empty cache."""
+    parts = [private_numba._kept, private_numba._with_digests, private_numba._linked_only]
+    monkeypatch.setenv("SALTUS_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(private_numba, "_plain", threading.Event())
+    for part in parts:
+        part.cache_clear()
+    yield
+    for part in parts:
+        part.cache_clear()
+
+
+def changed(part, how):
+    """A part of numba as another version may have it; None: the version does not have it."""
+    if how == "a function":
+        return lambda: None
+    if isinstance(part, type):
+        return type(part.__name__, (part,), {how: lambda self: None})
+    return SimpleNamespace(**{how: lambda: None})
+
+
+@pytest.mark.parametrize(("name", "how"), CHANGES)
+def test_with_another_private_part_functions_are_compiled_in_the_plain_way(name, how, unused, monkeypatch, caplog):
+    whole = private_numba._private
+
+    def other(module, wanted):
+        if wanted == name and how == "absent":
+            raise AttributeError(wanted)
+        return changed(whole(module, wanted), how) if wanted == name else whole(module, wanted)
+
+    monkeypatch.setattr(private_numba, "_private", other)
+    for _ in range(2):  # compiled, and from the cache
+        made = load_module("within", WITHIN + CALLER)
+        given = pointer(made.four_times)
+        assert [made.eight_times(1.5), entry_point(made.call)(given, 1.25), made.call(given, 2.5)] == [12.0, 20.0, 40.0]
+        del sys.modules[made.__name__]
+    assert private_numba.is_plain()
+    assert len(caplog.messages) == 1
+    assert "plain way" in caplog.text
+
+
+def test_where_addresses_are_kept_otherwise_they_are_had_in_the_documented_way(unused):
+    made = load_module("within", WITHIN + CALLER)
+    made.four_times.get_compile_result = lambda: None  # takes another number of arguments
+    made.call.overloads = {}
+    assert entry_point(made.call)(pointer(made.four_times), 1.25) == 20.0
+    del sys.modules[made.__name__]
+
+
+@pytest.mark.thorough
+def test_motions_are_the_same_in_numba_s_plain_way(tmp_path):
+    plain = "from saltus.taylor import private_numba; private_numba.be_plain()\n" + BOTH
+    assert run(plain, tmp_path) == run(BOTH, cache_directory().parent)
+
+
+def test_what_is_private_of_numba_is_imported_in_one_file():
+    """By name, or by its name in a string; `numba`, `numba.extending` and `numba.types` are public."""
+    found = set()
+    for path in (SOURCE / "saltus").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module] if isinstance(node, ast.ImportFrom) and node.module else []
+            names += [node.value] if isinstance(node, ast.Constant) and isinstance(node.value, str) else []
+            if any(re.fullmatch(r"numba\.(?!extending$|types$)[\w.]+", name) for name in names):
+                found.add(path.name)
+    assert found == {"private_numba.py"}

@@ -79,12 +79,18 @@ def load_module(kind: str, text: str) -> ModuleType:
     with loading:
         try:
             return _loaded(module_name(kind, text), text)
-        except (AttributeError, TypeError) as error:
+        except OSError:
+            raise
+        except Exception as error:  # numba wraps what it meets in errors of its own
             if private_numba.is_plain():
                 raise
-            log.warning("numba is used in its plain way, which compiles for longer: %s", error)
-            private_numba.be_plain(str(error))
-        return _loaded(module_name(kind, text), text)
+            private_numba.be_plain()
+            try:
+                made = _loaded(module_name(kind, text), text)
+            except Exception:
+                raise error from None  # which has another reason, then
+            log.warning("numba is used in its plain way, which compiles for longer: %s", str(error).splitlines()[0])
+            return made
 
 
 def _loaded(name: str, text: str) -> ModuleType:

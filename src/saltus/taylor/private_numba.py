@@ -11,6 +11,7 @@ from __future__ import annotations
 import importlib
 import io
 import os
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -28,17 +29,17 @@ OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "nsz
 WITHIN: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 LEAN: dict[str, Any] = {"_nrt": False} | WITHIN
 
-_plain: list[str] = []  # why numba is used in its plain way
+_plain = threading.Event()
 
 
-def be_plain(reason: str) -> None:
+def be_plain() -> None:
     """Use nothing private from now on."""
-    _plain.append(reason)
+    _plain.set()
 
 
 def is_plain() -> bool:
     """Whether a private part was found to be another than expected."""
-    return bool(_plain)
+    return _plain.is_set()
 
 
 def _private(module: str, name: str) -> Any:
