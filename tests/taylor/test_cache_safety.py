@@ -11,8 +11,10 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from generated_functions import Generated
 
-from saltus.taylor import cache, load_module, module_name
+from saltus.systems import Load, System, VelocityReduction, WallOscillator
+from saltus.taylor import cache, generated, load_module, machine_code, module_name
 from saltus.taylor.cache import cache_directory, undamaged
 
 SOURCE = """
@@ -262,3 +264,42 @@ def test_of_processes_that_want_the_same_code_at_once_one_compiles_it(home):
     said = [process.communicate()[0].split() for process in begun]
     assert sorted(misses for misses, _ in said) == ["0", "0", "1"]
     assert {value for _, value in said} == {"6.0"}
+
+
+def objects(home, system):
+    """The object files of a structure, which is loaded as if it had not been before, and a coefficient of its series."""
+    generated._loaded.clear()
+    made = Generated(system)
+    return list((home / "cache" / "kernels").glob("structure_*.o")), made.coefficients(0.0, 0.1, 0.2, 6)[0, 5]
+
+
+@pytest.mark.parametrize("change", ["flip", "cut", "link"])
+def test_a_damaged_object_file_is_made_again_with_a_remark(home, caplog, change):
+    system = System(model=WallOscillator(damping=0.1), load=Load(frequency=1.0), impact=VelocityReduction(0.8))
+    (path,), value = objects(home, system)
+    content = path.read_bytes()
+    assert undamaged(str(path)) == content[:-32]
+    assert stat.S_IMODE(path.stat().st_mode) & 0o077 == 0
+    if change == "link":
+        target = home / "elsewhere.o"
+        target.write_bytes(content)
+        path.unlink()
+        path.symlink_to(target)
+    else:
+        middle = len(content) // 2
+        path.write_bytes(content[:middle] + (bytes([content[middle] ^ 1]) + content[middle + 1 :] if change == "flip" else b""))
+    assert objects(home, system) == ([path], value)
+    assert f"{path} is {'not the user' if change == 'link' else 'damaged'}" in caplog.text
+    assert path.read_bytes() == content
+
+
+def test_an_object_file_is_named_by_the_processor_and_by_llvm_s_version(home, monkeypatch):
+    system = System(model=WallOscillator(damping=0.1), load=Load(frequency=1.0), impact=VelocityReduction(0.8))
+    (first,), value = objects(home, system)
+    generated.written_by.cache_clear()
+    monkeypatch.setattr(machine_code, "made_for", lambda: "another machine")
+    both, again = objects(home, system)
+    assert len(both) == 2
+    assert first in both
+    assert again == value
+    generated.written_by.cache_clear()

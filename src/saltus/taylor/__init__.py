@@ -1,12 +1,15 @@
 """From a model's Python to its Taylor series in machine code: traced, differentiated, written, compiled and cached.
 
 The path of an equation. `tracing.py` runs a model once on symbols, which gives a graph of shared nodes (`graph.py`).
-`derivatives.py` differentiates it. `tapes.py` lists the nodes, operands first, for a generated source file (`generated.py`).
-When that file is compiled, `series.py` (Taylor coefficients) and `instants.py` (values at one instant) write LLVM's
-instructions for the tapes by the rules of `rules.py`: for one motion on plain doubles, for an ensemble on vectors with one double
-for each lane. `memory.py` has the places of the code's arguments, `vectors.py` the arithmetic on which it is written;
-`lane_vectors.py` gives numba the same vectors for the ensemble's own loops. There is no second generator, and each function has
-one rule.
+`derivatives.py` differentiates it. `tapes.py` lists the nodes, operands first. Of a structure's functions, each with its tapes
+and the places of its numbers, `generated.py` makes LLVM's text: `series.py` (Taylor coefficients) and `instant` (values at one
+instant) write the instructions by the rules of `rules.py`, for one motion on plain doubles, for an ensemble on vectors with one
+double for each lane. `machine_code.py` compiles it by llvmlite, without numba. `memory.py` has the places of the code's
+arguments, `vectors.py` the arithmetic on which it is written; `lane_vectors.py` gives numba the same vectors for the ensemble's
+own loops. There is no second generator, and each function has one rule.
+
+Kernels, which no model changes, are compiled by numba (`kernels.py`, `private_numba.py`) and call a structure's functions by
+their addresses (`numba_types.py`).
 
 Assumptions of the generated code. The time enters through the load only, as a local time that restarts with every forcing
 period. Expressions that are expanded in series hold no comparisons; on one side of a contact they are analytic wherever they are
@@ -19,9 +22,10 @@ How an elementary function is added: by one entry in `FUNCTIONS` (`rules.py`), N
 follow from it (of a function that does not increase, the bounds need an entry in `bounds/intervals.py`), and
 `tests/taylor/test_series.py` goes through the table and compares the coefficients with power series in 40 digits.
 
-How code is cached: a generated file lies in the user's cache directory under a digest of its text, of the sources that write its
-code and of numba's options (`cache.py`), and numba keeps the machine code beside it. Numbers are arguments, so that new numbers
-never compile anything. Interfaces of numba that are not public are used in `private_numba.py` alone.
+How code is cached: in the user's cache directory (`cache.py`). A structure's object file has the digest of its functions' tapes,
+of the sources that write their code, of llvmlite's version and of the processor in its name; a kernel's file that of its text and
+of the sources that compile it, and numba keeps the machine code beside it. Numbers are arguments, so that new numbers never
+compile anything. Interfaces of numba that are not public are used in `private_numba.py` alone.
 """
 
 from saltus._front_door import front_door

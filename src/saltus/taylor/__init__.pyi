@@ -28,7 +28,7 @@ from .lane_vectors import (
 )
 from .load_tables import anchor, expand_record, own_records, record_table, record_tables
 from .memory import Places
-from .numba_types import Pointer, from_python, function_type, written_type
+from .numba_types import Pointer, function_type, written_type
 from .private_numba import entry_point, pointer
 from .rules import FUNCTIONS
 from .series import Rows
@@ -76,7 +76,6 @@ __all__ = [
     "expand_record",
     "first_lane",
     "fma",
-    "from_python",
     "function_type",
     "functions_text",
     "inline_jit",

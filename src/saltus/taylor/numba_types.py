@@ -13,12 +13,10 @@ the other, and two or more results are put where the last argument says.
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable, Iterator
 from itertools import product
 from typing import Any
 
-import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.extending import (
@@ -295,26 +293,6 @@ def _assembled(kind: Any, waiting: Iterator[Any]) -> Any:
     if isinstance(kind, types.Array):
         return Array(first, (None, *(next(waiting) for _ in range(kind.ndim - 1))))
     return first
-
-
-def from_python(function: Pointer) -> Callable[..., None]:
-    """A function that is written for LLVM, and returns nothing, to be called from Python with arrays and tuples of arrays."""
-    kinds = [ctypes.c_longlong if part == LONG else ctypes.c_void_p for part in written_function(function.kind.signature).args]
-    call = ctypes.CFUNCTYPE(None, *kinds)(int(function))
-
-    def called(*arguments: Any) -> None:
-        parts: list[Any] = []
-        for given in arguments:
-            for array in given if isinstance(given, tuple) else (given,):
-                parts += (_first(array), *array.shape[1:])
-        call(*parts)
-
-    return called
-
-
-def _first(array: np.ndarray) -> int:
-    """Where the first element of an array is."""
-    return int(array.__array_interface__["data"][0])
 
 
 # --- functions whose code is written here --------------------------------------------------------------------------------------

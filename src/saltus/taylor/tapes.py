@@ -1,4 +1,4 @@
-"""Tapes: the nodes of expressions as a list, operands before the nodes that use them, which is their form in a generated file.
+"""Tapes: the nodes of expressions as a list, operands before the nodes that use them.
 
 A node is a tuple of its operation and its operands' places on the tape, or of a leaf's kind and its index or value. In a tape
 for series an elementary function names, besides its argument, the series of its slope and a factor of it (see `rules.py`). The

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 from types import ModuleType
 from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
@@ -33,7 +33,6 @@ from saltus.taylor import (
     compiled_part,
     digest,
     entry_point,
-    from_python,
     is_steep,
     load_functions,
     load_module,
@@ -89,21 +88,40 @@ class Structure:
     def prepare(self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray]) -> tuple[tuple[Any, ...], Any]:
         """The arguments `env` and `model` of the kernel for given numbers (see `one_contact/kernel.py`)."""
         constants, geometry = np.zeros(self.constant_count), np.zeros(3)
-        fill_constants, fill_geometry = self._fill
-        fill_constants(parameters, constants)
+        fill_constants, fill_geometry = _load_fillers()
+        fill_constants(self.tables[0], parameters, constants)
         if self.several:
             modes = np.append(np.zeros(self.frictions), np.ones(self.sizes.own))
             env = (np.append(parameters, modes), constants, *records)
             series, matrices, slopes, tangent = self.functions
             return env, ContactsFunctions(series, matrices, np.array(self.signs, dtype=float), slopes, tangent)
         env = (parameters, constants, *records)
-        fill_geometry(env, geometry)
+        fill_geometry(self.tables[1], env, geometry)
         series, contact_series, reset, damping, tangent = self.functions
         return env, OneContactFunctions(series, contact_series, reset, damping, geometry, tangent)
 
-    @cached_property
-    def _fill(self) -> tuple[Callable[..., None], ...]:
-        return tuple(map(from_python, self.tables))
+
+_FILLERS = """
+from numba import types
+from saltus.taylor.numba_types import written_type
+
+
+@cached_jit(types.void(written_type(CONSTANTS), *CONSTANTS.args))
+def fill_constants(function, parameters, constants):
+    function(parameters, constants)
+
+
+@cached_jit(types.void(written_type(GEOMETRY), *GEOMETRY.args))
+def fill_geometry(function, env, geometry):
+    function(env, geometry)
+"""
+
+
+@cache
+def _load_fillers() -> tuple[Callable[..., None], Callable[..., None]]:
+    """Functions that call a structure's `constants` and `geometry` with arrays."""
+    module = load_module("fillers", _SIGNATURES + _FILLERS)
+    return entry_point(module.fill_constants), entry_point(module.fill_geometry)
 
 
 @cache
