@@ -3,6 +3,7 @@
 import pickle
 from enum import StrEnum
 
+import numpy as np
 import pytest
 
 import saltus
@@ -100,3 +101,25 @@ def test_memory_and_work_are_estimated(monkeypatch):
 
 def test_the_free_memory_is_told():
     assert 1e6 < free_memory() < 1e15
+
+
+VAST = np.broadcast_to(np.float64(1.0), 10**12)  # eight bytes
+FORCED = SYSTEM.with_({"load.horizontal": saltus.Harmonic(amplitude=0.3), "load.vertical": -0.5})
+
+
+@pytest.mark.parametrize(
+    ("name", "ask"),
+    [
+        ("values", lambda: saltus.attractors_along(FORCED, "load.frequency", VAST)),
+        ("labels", lambda: saltus.attractors.uncertainty_exponent(VAST)),
+        ("series", lambda: saltus.zero_one_test(range(10**9))),
+        ("time", lambda: saltus.Record(range(10**9), [0.0, 1.0])),
+        ("times", lambda: saltus.simulate(FORCED, theta=0.1, periods=1, times=range(10**9))),
+        ("theta", lambda: saltus.basins_of_attraction(FORCED, theta=range(10**9), velocity=[0.0, 1.0])),
+        ("theta", lambda: saltus.simulate_many(FORCED, theta=np.zeros((10**5, 1)), velocity=np.zeros(10**5), periods=1)),
+    ],
+)
+def test_sizes_are_looked_at_before_arrays_are_made(name, ask):
+    with pytest.raises(ParameterError, match=r"are the most|GB of memory") as refusal:
+        ask()
+    assert refusal.value.parameter == name

@@ -107,6 +107,8 @@ def good(made):
         "saltus.switch_branch": {"special": fold, "bounds": (0.8, 1.1)},
         "saltus.zero_one_test": {"series": np.sin(np.arange(300.0))},
         "saltus.branch_of": {"diagram": xarray.DataTree(), "number": 0},
+        "saltus.branches_of": {"diagram": xarray.DataTree()},
+        "saltus.save": {"path": "motion", "result": made["motion"]},
         "attractors.basin_entropy": {"labels": labels},
         "attractors.uncertainty_exponent": {"labels": labels},
         "attractors.unstable_manifold": {"orbit": saddle},

@@ -20,6 +20,7 @@ ALIKE = {
     "str | Path": "path",
     "Box": "window",
     "Metainterface | TwoLayer": "Model",
+    "ContactModel": "Model",
     "int | Workers": "int",
 }
 # Names with two meanings, which are those of the field in both: what a dimension, a figure of a formula or a file is called.

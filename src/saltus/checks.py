@@ -247,7 +247,7 @@ def check_size(values: Any, name: str | None = None) -> None:
     ParameterError
         The error has the number of values.
     """
-    size = values.size if isinstance(values, np.ndarray) else len(values) if hasattr(values, "__len__") else 0
+    size = getattr(values, "size", None) if hasattr(values, "ndim") else len(values) if hasattr(values, "__len__") else 0
     if isinstance(size, int) and size > LIMITS.count:
         raise ParameterError(f"{name or 'a list'} has {size} values, and {LIMITS.count} are the most", name)
 
@@ -306,6 +306,7 @@ def instants(times: Any) -> np.ndarray:
     ParameterError
         Anything else.
     """
+    check_size(times, "times")
     try:
         asked = np.atleast_1d(np.asarray(times, dtype=float))
     except (TypeError, ValueError):
@@ -323,6 +324,7 @@ def check_states(name: str, states: Any, dimension: int = 2) -> np.ndarray:
     ParameterError
         Anything but such an array of finite numbers; the error has the name.
     """
+    check_size(states, name)
     try:
         array = np.asarray(states, dtype=float).reshape(-1, dimension)
     except (TypeError, ValueError):

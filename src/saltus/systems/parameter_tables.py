@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from saltus.checks import LIMITS
+from saltus.checks import LIMITS, check_memory
 from saltus.errors import ParameterError, near, shown
 from saltus.systems.parameters import numbers
 from saltus.systems.system import System
@@ -104,6 +105,7 @@ def broadcast_arrays(arrays: dict[str, Any]) -> tuple[tuple[str, ...], tuple[int
     if named and many:
         raise ParameterError(f"{min(named)} has named dimensions and {many[0]} has not; give DataArrays or arrays, not both")
     if named:
+        _check_together(min(named), {dim: size for a in named.values() for dim, size in a.sizes.items()}.values())
         together = _aligned(named)
         dims, shape = next((tuple(str(d) for d in a.dims), a.shape) for a in together.values())
         flat = {name: a.values.reshape(-1) for name, a in together.items()} | plain
@@ -113,8 +115,15 @@ def broadcast_arrays(arrays: dict[str, Any]) -> tuple[tuple[str, ...], tuple[int
     except ValueError:
         shapes = ", ".join(f"{name} {plain[name].shape}" for name in many)
         raise ParameterError(f"the arrays do not broadcast together: {shapes}", "parameters") from None
+    _check_together(next(iter(many), "parameters"), shape)
     dims = ("trajectory",) if len(shape) == 1 else tuple(f"axis_{i}" for i in range(len(shape)))
     return dims, shape, {}, {name: np.broadcast_to(a, shape).reshape(-1) if a.ndim else a for name, a in plain.items()}
+
+
+def _check_together(name: str, lengths: Iterable[int]) -> None:
+    """Refuse more motions than fit into memory before their arrays are made."""
+    motions = math.prod(map(float, lengths))
+    check_memory(name, motions * LIMITS.motion, f"{motions:.3g} motions")
 
 
 def _aligned(named: dict[str, Any]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.checks import LIMITS, RADIANS, check_count, check_number, settle_numbers
+from saltus.checks import LIMITS, RADIANS, check_count, check_number, check_size, settle_numbers
 from saltus.errors import ParameterError, shown
 
 
@@ -136,6 +136,7 @@ QUANTITY_ORDER = {"force": 0, "displacement": 0, "velocity": 1, "acceleration": 
 
 def _samples(where: str, name: str, given: Any) -> np.ndarray:
     """The numbers of a list."""
+    check_size(given, name)
     try:
         samples = np.array(given)
     except (TypeError, ValueError):

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import LIMITS, check_memory, check_number
+from saltus.checks import LIMITS, check_memory, check_number, check_size
 from saltus.errors import ParameterError
 from saltus.flow.kernel.structures import limits_of
 from saltus.flow.motion.forcing_time import Clock, clock
@@ -80,6 +80,7 @@ def _check_dense(when: Clock, periods: float | None, duration: float | None) -> 
 
 
 def _sample_times(given: Any, start: float) -> np.ndarray:
+    check_size(given, "times")
     try:
         times = np.atleast_1d(np.asarray(given, dtype=float))
     except (TypeError, ValueError):
