@@ -214,7 +214,7 @@ def restarted(restart: Restart, point: OrbitPoint) -> OrbitPoint | End:
     equations, period = point.orbit.equations, point.orbit.period
     for values in restart.values:
         try:
-            system = equations.at(values)
+            system = equations.system_at(values)
             motion = simulate(system, **restart.state, periods=SETTINGS.settling * period, dense=False)
             state = arguments_of(system, np.append(motion.position, motion.velocity))
             orbit = orbit_from(equations_of(system, Signature((), 1), equations.paths, equations.tol), state, period)
