@@ -33,7 +33,7 @@ RESULTS = {
     "config": ("Study",),
     "continuation": ("CurveEnd", "End", "Evidence", "Missed"),
     "flow": ("ContactRegularity", "Event", "Impacts", "Release", "Validity", "available_cores", "share_cores"),
-    "orbits": ("Cascade", "OrbitEnd", "RestingOrbit", "Search", "Signature", "SpecialKind"),
+    "orbits": ("Cascade", "OrbitEnd", "Search", "Signature", "SpecialKind"),
     "studies": ("Borders",),
     "sweep": ("Failure", "Plan", "StoreStatus", "SweepInterrupted", "Variable"),
     "systems": (

@@ -16,9 +16,7 @@ from saltus.continuation import (
     EndReason,
     EquationCurve,
     Events,
-    NaturalCurve,
     Point,
-    bisected,
     both_ways,
     located,
     newton,
@@ -193,41 +191,6 @@ def test_where_no_step_is_short_enough_the_end_says_so():
     found = both_ways(spike.start(1.0, 1.0), Events, WIDE, steps=replace(STEPS, most_points=2000))
     assert {end.reason for end in found.ends} == {CurveEnd.NO_STEP, CurveEnd.BOUND}
     assert min(abs(point.parameter) for point in found.points) < 1e-9
-
-
-@dataclass(frozen=True, eq=False)
-class Root(NaturalCurve[Point]):
-    """y = sqrt(0.3 - p) as far as there is one."""
-
-    bounds: tuple[float, float] = (-1.0, 1.0)
-    scale: float = 1.0
-
-    def solution_at(self, value):
-        return None if value > 0.3 else Point(self, np.array([value]), np.array([self.scale]), 0)
-
-    def turn(self, a, b):
-        return abs((0.3 - a.parameter) ** 0.5 - (0.3 - b.parameter) ** 0.5)
-
-
-class EndOfRoot(Events):
-    """The end where there is no solution left."""
-
-    def stalled(self, run, point, step):
-        last, beyond = bisected(point, point.curve.ahead(point, step), lambda other: True)
-        run.points.append(last)
-        assert abs(beyond - last.parameter) < 1e-12
-        return End(CurveEnd.NO_STEP, last.parameter, detail="root")
-
-
-def test_a_natural_curve_is_followed_by_its_parameter_to_where_it_ends():
-    curve = Root()
-    found = both_ways(curve.solution_at(0.0), EndOfRoot, {"p": (-1.0, 1.0)}, steps=replace(STEPS, most=0.2, aim=0.06, least=1e-6))
-    assert found.points[0].parameter == -1.0
-    assert found.ends[0] == End(CurveEnd.BOUND, -1.0)
-    assert found.ends[1].parameter == pytest.approx(0.3, abs=1e-12)
-    parameters = np.array([point.parameter for point in found.points])
-    assert (np.diff(parameters) > 0.0).all()
-    assert np.diff(parameters)[-2] < 0.5 * np.diff(parameters).max()  # shorter steps where the solution changes faster
 
 
 def test_reasons_are_data_and_their_text_is_a_sentence():

@@ -120,7 +120,7 @@ def test_a_mass_that_sticks_for_good_is_refused() -> None:
 
 
 def test_an_orbit_whose_impacts_die_away_is_that_of_the_engine_for_one_contact() -> None:
-    """A mass that is pulled off a stop in every period, bounces and rests: a `RestingOrbit` of `WallOscillator`, or one stop."""
+    """A mass that is pulled off a stop in every period, bounces and rests: a `WallOscillator`, or one stop."""
     load = saltus.Load(frequency=1.0, force=saltus.Harmonic(amplitude=1.5, mean=1.0))
     law, numbers = saltus.VelocityReduction(0.4), {"stiffness": 0.2, "damping": 0.1}
     wall = saltus.System(model=saltus.WallOscillator(wall=0.0, **numbers), load=load, impact=law)

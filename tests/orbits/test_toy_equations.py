@@ -67,14 +67,14 @@ class HarmonicBalance(OrbitEquations):
         return base.with_signature(Signature((), motion.periods)), np.array(guess)
 
     def _residual(self, unknowns: np.ndarray, values: np.ndarray) -> np.ndarray:
-        system = self.at(values)
+        system = self.system_at(values)
         (a, b), w, c = unknowns, self.frequency(values), system.model.damping
         return np.array([(1.0 - w**2) * a + c * w * b, (1.0 - w**2) * b - c * w * a - system.parameters["load.force.amplitude"]])
 
     def evaluate(
         self, unknowns: np.ndarray, values: np.ndarray, with_extremes: bool = False, *, later: np.ndarray | None = None
     ) -> BalanceEvaluation | None:
-        w, c = self.frequency(values), self.at(values).model.damping
+        w, c = self.frequency(values), self.system_at(values).model.damping
         here = np.array([[1.0 - w**2, c * w], [-c * w, 1.0 - w**2]])[None]
         columns = [
             (self._residual(unknowns, values + h) - self._residual(unknowns, values - h)) / (2.0 * STEP)

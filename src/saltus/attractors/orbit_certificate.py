@@ -73,7 +73,7 @@ class Certificate:
             "defect": self.orbit.defect,
             "distance": self.distance,
             "amplitude": self.orbit.amplitude,
-            "impacts": self.orbit.signature.impact_count,
+            "impacts": self.orbit.impact_count,
         }
 
 

@@ -5,7 +5,6 @@ from .curve import Curve, Point
 from .end import CurveEnd, End, EndReason
 from .events import Cut, Events
 from .missed import CurveMissed, Missed, MissedReason
-from .natural_parameter import NaturalCurve, bisected
 from .predictor import between
 from .pseudo_arclength import EquationCurve
 from .step_length import STEPS, StepSettings
@@ -31,14 +30,12 @@ __all__ = [
     "Evidence",
     "Missed",
     "MissedReason",
-    "NaturalCurve",
     "Point",
     "StepSettings",
     "TestFunction",
     "Watch",
     "Zero",
     "between",
-    "bisected",
     "both_ways",
     "located",
     "newton",

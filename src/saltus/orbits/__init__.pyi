@@ -8,7 +8,6 @@ from .branches.special_point import OrbitEnd, SpecialKind, SpecialPoint
 from .branches.switching import Cascade, doubling_cascade, switch_branch
 from .equations.kinds import equations_of
 from .equations.one_contact import OneContactEquations
-from .equations.resting import RestingOrbit
 from .finding.from_motion import find_orbit, orbit_from
 from .finding.near_returns import orbits_near_returns, solved_near
 from .finding.search import Search, search_orbits
@@ -28,7 +27,6 @@ __all__ = [
     "OneContactEquations",
     "OrbitEnd",
     "PeriodicOrbit",
-    "RestingOrbit",
     "Search",
     "Signature",
     "SpecialCurve",

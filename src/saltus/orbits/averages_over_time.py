@@ -12,7 +12,6 @@ import numpy as np
 from saltus.checks import check_count
 from saltus.errors import ParameterError, near
 from saltus.flow import Motion
-from saltus.orbits.equations.resting import RestingOrbit
 from saltus.orbits.free_orbits import FreeOrbit
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.public_functions import answered
@@ -21,7 +20,7 @@ from saltus.systems import ContactModel, Model, System
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(
     16
 )  # Gauss's rule in each step: exact for polynomials up to degree 31, and a step's Taylor series has order 23 at most
-Followed = Motion | PeriodicOrbit | RestingOrbit | FreeOrbit
+Followed = Motion | PeriodicOrbit | FreeOrbit
 Response = Callable[[np.ndarray, Any, Any], Any]
 
 
@@ -175,7 +174,7 @@ def _course(of: Followed, periods: int | None) -> _Course:
 
 def _round(orbit: PeriodicOrbit | FreeOrbit) -> tuple[Motion, float, float]:
     """A motion on an orbit, and one period of it that neither begins nor ends at an impact."""
-    if isinstance(orbit, (FreeOrbit, RestingOrbit)):
+    if isinstance(orbit, FreeOrbit):
         motion = orbit.motion()
         return motion, motion.start, motion.time
     motion = orbit.motion(2 * orbit.period)

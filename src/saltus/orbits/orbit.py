@@ -117,9 +117,21 @@ class PeriodicOrbit(Result):
         return 2.0 * math.pi * self.period / self.frequency
 
     @cached_property
+    def _impacts(self) -> tuple[np.ndarray, np.ndarray]:
+        """The phases and speeds of the impacts in one period; those of an orbit with rests follow its first release."""
+        phases, speeds = self.equations.impacts(self.solution)
+        if self.symmetric:
+            phases, speeds = np.concatenate([phases, phases + self.equations.closing]), np.tile(speeds, 2)
+        if not self.releases.size:
+            return phases, speeds
+        first = self.releases[0] * self.frequency
+        phases = first + (phases - first) % (2.0 * math.pi * self.period)
+        order = np.argsort(phases)
+        return phases[order], speeds[order]
+
+    @property
     def _phases(self) -> np.ndarray:
-        phases, _ = self.equations.impacts(self.solution)
-        return np.concatenate([phases, phases + self.equations.closing]) if self.symmetric else phases
+        return self._impacts[0]
 
     @cached_property
     def impact_times(self) -> np.ndarray:
@@ -139,13 +151,13 @@ class PeriodicOrbit(Result):
 
     @property
     def _shift(self) -> float:
-        return math.floor(self._phases[0] / (2.0 * math.pi)) if self._phases.size else 0.0
+        counted = self._phases.size and not self.releases.size
+        return math.floor(self._phases[0] / (2.0 * math.pi)) if counted else 0.0
 
     @property
     def speeds(self) -> np.ndarray:
         """The speeds at which the gap closes, just before the impacts, (n,)."""
-        _, speeds = self.equations.impacts(self.solution)
-        return np.tile(speeds, 2) if self.symmetric else speeds
+        return self._impacts[1]
 
     @property
     def sides(self) -> np.ndarray:
@@ -153,20 +165,39 @@ class PeriodicOrbit(Result):
         sides = np.array(self.signature.sides, dtype=int)
         return np.concatenate([sides, -sides]) if self.symmetric else sides
 
+    @cached_property
+    def _excursions(self) -> np.ndarray:
+        """The releases and the rests after them, (n, 2), from the release on that is earliest in the forcing period."""
+        found, period = self.equations.rests(self.solution), self.duration / self.period
+        if not found.size:
+            return found
+        within = found[:, 0] % period
+        begin = found[int(np.argmin(within))]
+        turned = (found[:, 0] - begin[0]) % self.duration
+        first = within.min() + np.sort(np.where(turned > self.duration - TOLERANCES.release * period, 0.0, turned))
+        return np.column_stack([first, first + (found[:, 1] - found[:, 0])[np.argsort(turned)]])
+
     @property
     def releases(self) -> np.ndarray:
-        """The times at which it leaves rest at a contact, (n,)."""
-        return np.empty(0)
+        """The times at which it leaves rest at a contact, from phase 0 of the load's period in which the first one lies, (n,)."""
+        return self._excursions[:, 0]
 
     @property
     def rests(self) -> np.ndarray:
         """The times at which it comes to rest at a contact, each after the release of the same index, (n,)."""
-        return np.empty(0)
+        return self._excursions[:, 1]
+
+    @property
+    def rest_durations(self) -> np.ndarray:
+        """How long each rest lasts, (n,)."""
+        releases = self.releases
+        durations: np.ndarray = np.append(releases[1:], releases[:1] + self.duration) - self.rests
+        return durations
 
     @property
     def rest_share(self) -> float:
-        """The share of its period for which it rests."""
-        return 0.0
+        """The share of its period for which it rests at a contact."""
+        return float(self.rest_durations.sum() / self.duration)
 
     @property
     def residual(self) -> float:

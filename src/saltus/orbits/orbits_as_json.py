@@ -17,11 +17,9 @@ from saltus.continuation import CurveEnd, CurveMissed, End, Evidence, Missed
 from saltus.errors import ParameterError
 from saltus.orbits.branches.branch import Branch
 from saltus.orbits.branches.orbit_curve import OrbitCurve, OrbitPoint
-from saltus.orbits.branches.resting_family import RestingCurve, RestingPoint
 from saltus.orbits.branches.special_point import OrbitEnd, OrbitMissed, SpecialKind, SpecialPoint
-from saltus.orbits.equations.contract import OrbitEquations, OrbitEvaluation, Solution
+from saltus.orbits.equations.contract import OrbitEquations, Solution
 from saltus.orbits.equations.kinds import equations_of
-from saltus.orbits.equations.resting import RestingOrbit
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import ModeChange, Signature
 from saltus.systems import System
@@ -112,8 +110,8 @@ CLASSES: dict[str, tuple[type, Callable[[Any], tuple[Any, ...]], Callable[..., A
     "PeriodicOrbit": (PeriodicOrbit, _orbit_parts, _orbit),
 }
 for _class in (
-    *(Branch, SpecialPoint, OrbitCurve, RestingCurve, RestingPoint, RestingOrbit, Signature, ModeChange),
-    *(Solution, OrbitEvaluation, End, Evidence, Missed),
+    *(Branch, SpecialPoint, OrbitCurve, Signature, ModeChange),
+    *(End, Evidence, Missed),
 ):
     CLASSES[_class.__name__] = _class, _fields, _class
 _KINDS: tuple[type[Enum], ...] = (SpecialKind, OrbitEnd, CurveEnd, OrbitMissed, CurveMissed)

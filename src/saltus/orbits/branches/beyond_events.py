@@ -17,7 +17,7 @@ import numpy as np
 
 from saltus.continuation import Bounds, Corrected, Course, CurveEnd, Cut, End, Evidence, TestFunction, Zero
 from saltus.errors import SaltusError
-from saltus.flow import EventCode
+from saltus.flow import EventCode, load_releases, peak_near
 from saltus.orbits.branches.bifurcations import FLIP
 from saltus.orbits.branches.images import is_image, nearest, parent_of
 from saltus.orbits.branches.orbit_curve import OrbitPoint
@@ -70,6 +70,12 @@ class OtherSideSettings:
     same: float = 0.01  # Two orbits at one value of the parameter are the same within this share of a probe's distance.
     # Shares of the parameter's range at which orbits are looked for beyond the end of a rest, tried in turn.
     after_rest: tuple[float, ...] = (1e-5, 1e-4, 1e-3)
+    # Ahead of an orbit that has nearly shrunk to rest the loss of its release is looked for from this share of the range on,
+    # doubled so many times, and located to this relative precision; the peak of the pull from this phase before the release.
+    nearest_loss: float = 1e-9
+    doublings: int = 24
+    narrow: float = 1e-12
+    behind: float = 0.05
     along: float = 1e-6  # The distance to a second orbit on the branch, which gives the tangent at another section.
 
 
@@ -187,6 +193,34 @@ def _as_the_motion_goes_on(point: OrbitPoint) -> Restart:
     state = arguments_of(point.orbit.system, point.orbit.section_state)
     values = [point.parameters + distance * way for distance in SETTINGS.after_rest]
     return Restart(state, values, End(OrbitEnd.REST_VANISHES, point.parameter))
+
+
+def last_release(point: OrbitPoint) -> SpecialPoint | None:
+    """The parameter ahead of an orbit that has nearly shrunk to rest at which the load only just pulls a single contact open
+    (RL); None where it is not near."""
+    from scipy.optimize import brentq
+
+    equations, orbit, value = point.curve.equations, point.orbit, point.parameter
+    known = load_releases(orbit.system)
+    if orbit.system.model.holds_coordinates or not known:
+        return None
+
+    def pull(at: float) -> float:
+        """The least of the peaks of the pull after these releases, with the parameter at a value."""
+        system, turns = equations.system_at(np.array([at])), [(release, release.time * orbit.frequency) for release in known]
+        return min(peak_near(system, release.side, phase - SETTINGS.behind) for release, phase in turns)
+
+    reach, before = SETTINGS.nearest_loss * point.curve.scales[0], pull(value)
+    for _ in range(SETTINGS.doublings):
+        beyond = value + reach * np.sign(point.tangent[-1])
+        if (after := pull(beyond)) < 0.0:
+            narrow = SETTINGS.narrow * abs(beyond)
+            lost = float(brentq(pull, value, beyond, xtol=narrow, rtol=1e-15))
+            place = np.append(point.place[:-1], lost)
+            evidence = Evidence(point.residual, (narrow,), before, after, pull(lost))
+            return SpecialPoint(SpecialKind.RL, replace(point, place=place), evidence)
+        reach *= 2.0
+    return None
 
 
 def other_events(point: OrbitPoint, sequence: Events | None, points: Sequence[OrbitPoint] = ()) -> OrbitPoint | End:

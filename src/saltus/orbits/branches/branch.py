@@ -12,7 +12,6 @@ from saltus.checks import check_number
 from saltus.continuation import Course, End
 from saltus.notebook import html_table
 from saltus.orbits.branches.orbit_curve import OrbitPoint
-from saltus.orbits.branches.resting_family import RestingPoint
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialPoint
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.result import Result
@@ -25,11 +24,8 @@ START = End(OrbitEnd.START)
 
 
 @dataclass(frozen=True, eq=False)
-class Branch(Result, Course[OrbitPoint | RestingPoint, SpecialPoint]):
+class Branch(Result, Course[OrbitPoint, SpecialPoint]):
     """A branch: its points in order, its special points, and why it ends on both sides.
-
-    A family of resting orbits is a branch as well: `special` then holds grazings (GR), the zeros of margins and functions, and
-    the two ends special to such families, RL and CH.
 
     Attributes
     ----------

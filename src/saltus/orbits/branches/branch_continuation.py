@@ -13,10 +13,8 @@ from saltus.orbits.branches.branch import START, Branch
 from saltus.orbits.branches.branch_events import BranchEvents
 from saltus.orbits.branches.images import full_period, half
 from saltus.orbits.branches.orbit_curve import OrbitPoint, start
-from saltus.orbits.branches.resting_family import RestingEvents, first_point, resting_steps
 from saltus.orbits.branches.special_point import SpecialKind, UserFunction
 from saltus.orbits.equations.kinds import equations_of
-from saltus.orbits.equations.resting import RestingOrbit
 from saltus.orbits.finding.from_motion import orbit_near
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
@@ -75,13 +73,8 @@ def continue_orbit(
         if not callable(function):
             raise ParameterError(f"functions must be functions of an orbit, and {name!r} is {shown(function)}", "functions")
     low, high = _checked(orbit, path, bounds)
-    first: Any
-    events: Any
-    if isinstance(orbit, RestingOrbit):
-        first, events, steps = first_point(orbit, path, (low, high)), RestingEvents, resting_steps(step)
-    else:
-        first, steps = start(*along(orbit, path), scale=(high - low) / 3.0), replace(STEPS, longest=step)
-        events = partial(BranchEvents, while_stable=while_stable)
+    first, steps = start(*along(orbit, path), scale=(high - low) / 3.0), replace(STEPS, longest=step)
+    events = partial(BranchEvents, while_stable=while_stable)
     course = both_ways(first, lambda: events(functions or {}), {path: (low, high)}, steps, progress)
     return Branch(**vars(course), path=path)
 
@@ -91,15 +84,8 @@ def follow_stable(orbit: PeriodicOrbit, path: str, target: float) -> Branch:
     first. The steps are long, because only this outcome is asked for."""
     value = float(orbit.system.get(path))
     low, high = _checked(orbit, path, (min(value, target), max(value, target)))
-    first: Any
-    events: Any
-    if isinstance(orbit, RestingOrbit):
-        first, events = first_point(orbit, path, (low, high)), RestingEvents({})
-        steps = resting_steps(NEARBY_STEPS.longest)
-    else:
-        first, events = start(*along(orbit, path), scale=high - low), BranchEvents(while_stable=True)
-        steps = NEARBY_STEPS
-    run = Continuation({path: (low, high)}, events, steps)
+    first, events = start(*along(orbit, path), scale=high - low), BranchEvents(while_stable=True)
+    run = Continuation({path: (low, high)}, events, NEARBY_STEPS)
     run.follow(first if target > value else first.turned())
     return Branch(**vars(run.course(START)), path=path)
 

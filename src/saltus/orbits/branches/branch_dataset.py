@@ -112,8 +112,6 @@ def solution_columns(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
             {"long_name": "side of an orbit without impacts"},
         ),
     }
-    if not orbits[0].equations.system.model.holds_coordinates:
-        return data
     events = np.full((len(orbits), max(1, max(len(orbit.signature.events) for orbit in orbits)), 3), -1)
     for table, orbit in zip(events, orbits, strict=True):
         for row, event in zip(table, orbit.signature.events, strict=False):

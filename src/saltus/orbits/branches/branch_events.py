@@ -20,7 +20,7 @@ from saltus.orbits.branches.images import (
     passes_image,
     repetition,
 )
-from saltus.orbits.branches.orbit_curve import STEEPEST, OrbitPoint
+from saltus.orbits.branches.orbit_curve import SMALLEST, STEEPEST, OrbitPoint
 from saltus.orbits.branches.special_point import OrbitEnd, OrbitMissed, SpecialKind, UserFunction
 from saltus.orbits.equations.contract import Restart
 from saltus.orbits.equations.kinds import equations_of
@@ -43,7 +43,6 @@ class BranchLimits:
     # or the amplitude has shrunk below this share of the largest one, with more impacts than `shrunk_impacts`.
     shrunk: float = 1e-2
     shrunk_impacts: int = 60
-    smallest: float = 1e-7  # An orbit of an amplitude below this has shrunk to rest.
     # An orbit grows without end if its amplitude exceeds this, and exceeds that of the first orbit of the branch by this factor:
     # a thousand of the longest steps lead there.
     largest: float = 1e2
@@ -66,7 +65,14 @@ class OrbitEvents(Events):
         amplitude = ahead.orbit.amplitude
         if amplitude > SETTINGS.largest * max(1.0, run.points[0].orbit.amplitude):
             return End(OrbitEnd.GROWS, ahead.parameter, detail=f"{amplitude:.3g}")
-        return End(OrbitEnd.SHRINKS, ahead.parameter) if amplitude < SETTINGS.smallest else None
+        if amplitude >= SMALLEST:
+            return None
+        lost = ahead.orbit.equations.lost_ahead(ahead)
+        if lost is None:
+            return End(OrbitEnd.SHRINKS, ahead.parameter)
+        inside = all(low <= value <= high for (low, high), value in zip(run.bounds.values(), lost.parameters, strict=True))
+        run.special += [lost] if inside else []
+        return End(OrbitEnd.NO_PULL, lost.parameter, lost.kind) if inside else None
 
     def nearest(self, point: OrbitPoint, place: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
         return nearest(point, place, other)
@@ -216,8 +222,11 @@ def restarted(restart: Restart, point: OrbitPoint) -> OrbitPoint | End:
         try:
             system = equations.system_at(values)
             motion = simulate(system, **restart.state, periods=SETTINGS.settling * period, dense=False)
-            state = arguments_of(system, np.append(motion.position, motion.velocity))
-            orbit = orbit_from(equations_of(system, Signature((), 1), equations.paths, equations.tol), state, period)
+            state = arguments_of(system, motion.final_state)
+            base = equations_of(system, Signature((), 1), equations.paths, equations.tol)
+            orbit = orbit_from(base, state, period)
+            # once more from its own motion, which may have other events than one that has not settled
+            orbit = None if orbit is None else orbit_from(base, arguments_of(system, orbit.section_state), orbit.period)
         except SaltusError:
             continue
         if orbit is None or not orbit.admissible:

@@ -10,10 +10,8 @@ import numpy as np
 from saltus.checks import check_dataset
 from saltus.continuation import NEWTON
 from saltus.errors import ParameterError
-from saltus.flow import load_releases
 from saltus.orbits.equations.contract import OrbitEquations
 from saltus.orbits.equations.kinds import equations_of
-from saltus.orbits.equations.resting import resting_orbit
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import ModeChange, Signature
 from saltus.provenance import check_provenance
@@ -30,8 +28,8 @@ NEEDED = ("parameter", "unknowns")
 def orbits_of(dataset: xarray.Dataset) -> list[PeriodicOrbit]:
     """The orbits along `point` of a dataset that `Branch.to_xarray` or `SpecialCurve.to_xarray` made, bit for bit, in order.
 
-    The equations are evaluated at the kept unknowns, which must solve them; orbits that rest are followed again from
-    their first release. `continue_orbit` can go on from each of these orbits.
+    The equations are evaluated at the kept unknowns, which must solve them. `continue_orbit` can go on from
+    each of these orbits.
 
     Parameters
     ----------
@@ -53,8 +51,6 @@ def orbits_of(dataset: xarray.Dataset) -> list[PeriodicOrbit]:
     check_dataset(dataset, "a branch or a curve of special points", NEEDED, ("system", "tol"))
     system, tol = System.from_json(dataset.attrs["system"]), float(dataset.attrs["tol"])
     check_provenance(dataset.attrs, system, "the dataset of these orbits")
-    if "releases" in dataset:
-        return _resting_orbits(dataset, system)
     paths = tuple(map(str, dataset["path"].values)) if "path" in dataset.coords else (str(dataset.attrs["path"]),)
     values = np.atleast_2d(dataset["parameter"].values.T).T
     known: dict[Signature, OrbitEquations] = {}
@@ -70,8 +66,6 @@ def _signatures(dataset: xarray.Dataset) -> list[Signature]:
     """The signature of each orbit."""
     columns = (dataset[name].values for name in ("sides", "period", "symmetric", "side"))
     signatures = [_signature(*row) for row in zip(*columns, strict=True)]
-    if "events" not in dataset:
-        return signatures
     changes = [tuple(ModeChange(bool(k), int(i), int(c)) for k, i, c in table if k >= 0) for table in dataset["events"].values]
     more = zip(signatures, changes, dataset["closed_contacts"].values, dataset["section"].values, strict=True)
     return [
@@ -93,17 +87,3 @@ def _orbit(equations: OrbitEquations, row: np.ndarray, value: np.ndarray) -> Per
         error = "its motion cannot be followed" if orbit is None else f"its residual is {orbit.residual:.1e}"
         raise ParameterError(f"what is kept at {equations.paths[0]} = {values[0]:g} is no orbit ({error}): the data are damaged")
     return orbit
-
-
-def _resting_orbits(dataset: xarray.Dataset, system: System) -> list[PeriodicOrbit]:
-    """The orbits of a family of resting orbits: the release of the load with which each begins determines it."""
-    path, columns = str(dataset.attrs["path"]), ("parameter", "period")
-    orbits: list[PeriodicOrbit] = []
-    for first, value, periods in zip(dataset["releases"].values[:, 0], *(dataset[name].values for name in columns), strict=True):
-        here = system.with_({path: float(value)})
-        nearest = min(load_releases(here), key=lambda release: abs(release.time - first), default=None)
-        orbit = resting_orbit(equations_of(here, Signature((), 1), (path,)), nearest, int(periods)) if nearest else None
-        if orbit is None:
-            raise ParameterError(f"no orbit rests at {path} = {value:g}: the file is damaged, or of another version of saltus")
-        orbits.append(orbit)
-    return orbits

@@ -20,7 +20,6 @@ from saltus.orbits.branches.special_curve import ConditionedCurve, SpecialCurve,
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint
 from saltus.orbits.equations.contract import OrbitEquations
 from saltus.orbits.equations.kinds import equations_of
-from saltus.orbits.equations.resting import RestingOrbit
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.symmetry import keeps_symmetry
 from saltus.orbits.tolerances import TOLERANCES
@@ -137,10 +136,6 @@ def continue_special(
             "of models with several contacts or friction curves are followed of LP, PD and BPC, not of GR so far; "
             "continue an orbit at several values of the second parameter instead",
             "special",
-        )
-    if isinstance(special.orbit, RestingOrbit):
-        raise ParameterError(
-            "curves are followed of orbits between impacts only, and this one rests; continue it along one parameter", "special"
         )
     if special.kind == SpecialKind.GR and special.orbit.equations.passes_contact:
         raise ParameterError(

@@ -98,19 +98,11 @@ class OrbitEnd(EndReason):
     MEETS_GRAZING = "meets another grazing: {kind}"
     MEETS_CHANGE = "meets another change of the orbit's events: {kind}"
     REFUSED = "the system ends there: {detail}"
-    NO_PULL = "shrinks to rest at {parameter:.10g}: from there on the load no longer pulls the contact open on side {detail}"
+    NO_PULL = "shrinks to rest at {parameter:.10g}: from there on the load no longer pulls the contact open"
     REST_VANISHES = (
-        "at {parameter:.10g} a rest has no duration left; beyond, the load pulls before the impacts have died away: "
-        "find_orbit finds the orbit there"
+        "at {parameter:.10g} a rest has no duration left; beyond, the load pulls before the impacts have died away, "
+        "and the motion settles on no orbit near"
     )
-    REST_BEGINS = (
-        "at {parameter:.10g} a further rest begins, as impacts die away before a release: find_orbit finds the orbit beyond"
-    )
-    LEAPS = "at {parameter:.10g} the orbit leaps to one that differs by {detail}: find_orbit finds it"
-    RELEASE_LOST = "at {parameter:.10g} a release is lost: find_orbit finds the orbit beyond"
-    RELEASE_BORN = "at {parameter:.10g} a release is born: find_orbit finds the orbit beyond"
-    OTHER_RESTS = "beyond {parameter:.10g} no orbit with these rests follows from the release at {detail}"
-    NO_ORBIT = "beyond {parameter:.10g} there is no such motion: {detail}"
 
 
 class OrbitMissed(MissedReason):

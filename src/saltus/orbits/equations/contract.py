@@ -233,6 +233,10 @@ class OrbitEquations(ABC):
         """The number of impacts in the time that the equations cover, without those of accumulations."""
         return len(self.impacts(solution)[0])
 
+    def rests(self, solution: Solution) -> np.ndarray:
+        """The times in one period of an orbit at which it leaves rest at a contact and comes to rest again, (n, 2)."""
+        return np.empty((0, 2))
+
     def touching_speed(self, solution: Solution) -> float:
         """The least speed of the impacts at which the map loses its derivative if the speed vanishes; inf without such
         impacts."""
@@ -304,6 +308,10 @@ class OrbitEquations(ABC):
 
     def also_at(self, cut: Cut, following: Any) -> Zero | None:
         """A further special point at a cut, from the first point beyond; None if there is none."""
+        return None
+
+    def lost_ahead(self, point: Any) -> Zero | None:
+        """The special point ahead at which an orbit that has nearly shrunk to rest is lost; None if it shrinks without one."""
         return None
 
     def first_step(self, point: Any, ahead: Any) -> float:

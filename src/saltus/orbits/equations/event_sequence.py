@@ -36,6 +36,7 @@ class EventSettings:
 
 
 SETTINGS = EventSettings()
+AT_REST = 2  # the mode of a single contact at rest; on its sides -1 and +1 the mode is 1 and 3
 
 
 class OrbitEvent(NamedTuple):
@@ -118,6 +119,8 @@ def _groups(motion: Motion) -> tuple[Group, ...]:
     """The contacts of each group if the mass matrix couples no coordinates of different groups; else one group of all."""
     model, count = motion.system.model, len(motion.system.model.contacts)
     everything = (Group((1 << count + len(model.frictions)) - 1, (1 << count + 2 * len(model.frictions)) - 1),)
+    if not model.holds_coordinates:
+        return (Group(1, 3),)
     names = dict.fromkeys(contact.group for contact in model.contacts)
     if len(names) < 2 or model.frictions:
         return everything
@@ -135,6 +138,8 @@ def _groups(motion: Motion) -> tuple[Group, ...]:
 
 def _image(event: OrbitEvent, model: Model, images: Sequence[int]) -> OrbitEvent:
     """The mirror image of an event."""
+    if not model.holds_coordinates:
+        return event._replace(mode=2 * AT_REST - event.mode)
     closed, slides = modes_of(model, np.array(event.mode))
     count, mode = len(model.contacts), 1
     for i, image in enumerate(images):
@@ -148,7 +153,7 @@ def _image(event: OrbitEvent, model: Model, images: Sequence[int]) -> OrbitEvent
 def _listed(motion: Motion) -> tuple[list[OrbitEvent], np.ndarray, np.ndarray]:
     """The events that change the mode, without the impacts of accumulations; their times; and how fast each closes a contact."""
     found, dense = motion.events, motion.dense
-    times, codes, speeds = found.times, found.codes, np.full(len(found), math.inf)
+    times, codes, speeds = found.times, _codes(motion), np.full(len(found), math.inf)
     speeds[codes[:, 0] == EventCode.IMPACT] = impact_speeds(motion)
     # a rest is recorded besides the event that brings it, and at the start of a motion: it counts only if it stands alone
     alone = (np.searchsorted(times, times, side="right") - np.searchsorted(times, times) == 1) & (times > motion.start)
@@ -161,13 +166,25 @@ def _listed(motion: Motion) -> tuple[list[OrbitEvent], np.ndarray, np.ndarray]:
     if dense is None or not times.size:
         return [], times, speeds[chosen]
     modes = dense.side[np.searchsorted(dense.start, times, side="right") - 1]
+    modes = modes if motion.system.model.holds_coordinates else modes + AT_REST
     events = [OrbitEvent(*numbers) for numbers in np.column_stack([codes, modes]).tolist()]
     return events, times, speeds[chosen]
+
+
+def _codes(motion: Motion) -> np.ndarray:
+    """The kinds of a motion's events, and the contacts and frictions that act as bits, (n, 2). A single contact is the first bit,
+    and its rest is that of one that is held."""
+    codes = motion.events.codes
+    if motion.system.model.holds_coordinates:
+        return codes
+    return np.column_stack([np.where(codes[:, 0] == EventCode.RESTING, EventCode.HELD, codes[:, 0]), np.ones(len(codes), int)])
 
 
 def impact_speeds(motion: Motion) -> np.ndarray:
     """The least speed at which each impact closes one of its contacts, (n,)."""
     impacts, names = motion.impacts, motion.system.model.coordinates
+    if not motion.system.model.holds_coordinates:
+        return np.abs(impacts.velocity_before)
     speeds = np.full(len(impacts), math.inf)
     for i, contact in enumerate(motion.system.model.contacts):
         rates = np.abs(impacts.velocity_before[:, names.index(contact.coordinate)])

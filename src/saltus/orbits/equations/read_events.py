@@ -11,6 +11,7 @@ import numpy as np
 from saltus.errors import MotionError
 from saltus.flow import EventKind, Motion, modes_of
 from saltus.orbits.signature import ModeChange, Signature
+from saltus.systems import Model
 
 STAYS = "the motion comes to rest with all coordinates held at contacts for good, which is no orbit to follow"
 
@@ -38,14 +39,21 @@ def section_of(
     if phase is None:
         bounds = np.unique([motion.start, *(event.time for event in motion.events if motion.start < event.time < end), end])
         spans, middles = np.diff(bounds), 0.5 * (bounds[1:] + bounds[:-1])
-        closed, slides = modes_of(motion.system.model, motion.dense.states(middles)[2])
-        held = sum((closed >> i & 1 for i in range(len(motion.system.model.contacts))), sum(s == 0 for s in slides))
-        moves = held < len(motion.system.model.coordinates)
+        moves = _moves(motion.system.model, motion.dense.states(middles)[2])
         time = float(middles[max(range(len(spans)), key=lambda i: (moves[i], spans[i]))])
     else:
         time = motion.start + (phase / frequency - motion.start) % (2.0 * np.pi / frequency)
     state = np.concatenate([np.atleast_1d(x) for x in motion.at(time)])
     return time * frequency % (2.0 * np.pi), state
+
+
+def _moves(model: Model, sides: np.ndarray) -> np.ndarray:
+    """Whether a motion with these numbers `side` is not held altogether, (n,)."""
+    if not model.holds_coordinates:
+        return sides != 0
+    closed, slides = modes_of(model, sides)
+    held = sum((closed >> i & 1 for i in range(len(model.contacts))), sum(s == 0 for s in slides))
+    return np.asarray(held < len(model.coordinates))
 
 
 def read_signature(motion: Motion, periods: int, frequency: float) -> tuple[Signature, np.ndarray, np.ndarray]:

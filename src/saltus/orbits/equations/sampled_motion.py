@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow import Motion, modes_of
+from saltus.flow import Motion, contact_pull, modes_of
 from saltus.systems import reactions, stick_margins
 
 SAMPLES = 33  # in each step; minima of parabolas through them have errors of the fourth power of their distance
@@ -92,9 +92,36 @@ class SampledMotion:
 
     def margins(self) -> dict[str, float]:
         """The least value of each of the model's margins."""
-        system, side = self.motion.system, self.motion.system.model.every_side[0]
-        values = system.model.margins(self.time, *self._state(), side, system.load)
-        return {name: _least(np.broadcast_to(value, self.time.shape)) for name, value in values.items()}
+        system = self.motion.system
+        least = dict.fromkeys(system.model.margin_names(system.load), np.inf)
+        for side in system.model.every_side:
+            own = self if system.model.holds_coordinates else self.only(np.flatnonzero(self.side == side))
+            values = system.model.margins(own.time, *own._state(), side, system.load) if own.time.size else {}
+            for name, value in values.items():
+                least[name] = min(least[name], _least(np.broadcast_to(value, own.time.shape)))
+        return least
+
+    def lowest_gap(self) -> float:
+        """The lowest inner minimum of the gap of a single contact, inf without one."""
+        if self.motion.system.model.holds_coordinates:
+            return np.inf
+        least, one = [np.inf], self.motion.system.one_contact
+        for side in one.sides:
+            inward = one.inward(side)
+            course = inward * self.series[:, 0]
+            course[:, 0] -= inward * float(one.contact)
+            least.append(self._turning_of(course, inward * self.velocity[0], self.side == side))
+        return float(min(least))
+
+    def _nearest_of_one(self) -> float:
+        """`nearest_touch` with a single contact: its gap's minima, and how far the load is from pulling it open while it is at
+        rest."""
+        system, steps, least = self.motion.system, np.flatnonzero(self.side == 0), [self.lowest_gap()]
+        pulls = [contact_pull(system, side) for side in system.model.sides]
+        if steps.size:
+            resting = [np.ones(steps.size, dtype=bool) for _ in pulls]
+            least.append(self.only(steps)._dip(steps, resting, lambda model, t, *_: [-pull(t) for pull in pulls]))
+        return float(min(least))
 
     def nearest_touch(self) -> float:
         """How near the motion comes to a further change of its mode: the least of the inner minima of the gaps of open contacts,
@@ -104,6 +131,8 @@ class SampledMotion:
         For reactions and sticking frictions the value just after an event counts too. inf without such minima.
         """
         model, names = self.motion.system.model, self.motion.system.model.coordinates
+        if not model.holds_coordinates:
+            return self._nearest_of_one()
         closed, slides = modes_of(model, self.side)
         least = [np.inf]
         for i, contact in enumerate(model.contacts):

@@ -19,6 +19,8 @@ import numpy as np
 from saltus.continuation import Bounds, Cut, End, TestFunction, Zero
 from saltus.errors import MotionError, SaltusError
 from saltus.flow import (
+    EventCode,
+    EventKind,
     Motion,
     MotionRequest,
     Program,
@@ -36,6 +38,7 @@ from saltus.orbits.branches.beyond_events import (
     events_of,
     first_step,
     jump_over,
+    last_release,
     parent_at,
     refused_beyond,
     same_events,
@@ -83,7 +86,8 @@ class WholeMotionEquations(OrbitEquations):
     def read(cls, base: OrbitEquations, motion: MotionToRead) -> tuple[OrbitEquations, np.ndarray] | None:
         """With a section chosen along the motion, and the motion's state there."""
         system, twice, periods = base.system, motion.twice, motion.periods
-        if not system.model.holds_coordinates or twice.limit is not None:
+        rests = system.model.holds_coordinates or len(twice.events.of(EventKind.REST)) > 0
+        if not (rests and twice.phase_known) or twice.limit is not None:
             return None
         end = twice.start + motion.duration
         within = (twice.start < twice.events.times) & (twice.events.times < end)
@@ -107,6 +111,16 @@ class WholeMotionEquations(OrbitEquations):
     def impacts(self, solution: Solution) -> tuple[np.ndarray, np.ndarray]:
         times, speeds = solution.evaluation.ends[:, 0], solution.evaluation.ends[:, 1]
         return times * self.frequency(solution.values), speeds
+
+    def rests(self, solution: Solution) -> np.ndarray:
+        if self.system.model.holds_coordinates:
+            return np.empty((0, 2))
+        found, pairs = events_of(solution.evaluation), list[tuple[float, float]]()
+        landed = [time for event, time in zip(found.events, found.times, strict=True) if event.kind == EventCode.HELD]
+        for event, time in zip(found.events, found.times, strict=True):
+            if event.kind == EventCode.RELEASE:
+                pairs.append((time, min(later if later > time else later + found.period for later in landed)))
+        return np.array(pairs).reshape(-1, 2)
 
     def counted_impacts(self, solution: Solution) -> int:
         return events_of(solution.evaluation).impact_count // (2 if self.signature.symmetric else 1)
@@ -161,6 +175,9 @@ class WholeMotionEquations(OrbitEquations):
 
     def also_at(self, cut: Cut, following: OrbitPoint) -> Zero | None:
         return jump_over(cut, following)
+
+    def lost_ahead(self, point: OrbitPoint) -> Zero | None:
+        return last_release(point)
 
     def first_step(self, point: OrbitPoint, ahead: OrbitPoint) -> float:
         return first_step(point, ahead)
@@ -281,6 +298,8 @@ class WholeMotionEquations(OrbitEquations):
     def _impacts(self, motion: Motion) -> np.ndarray:
         """Times and speeds of the impacts, (n, 2), without those of accumulations; if several contacts close at one instant, each
         has its own row."""
+        if not self.system.model.holds_coordinates:
+            return np.column_stack([motion.impacts.time, np.abs(motion.impacts.velocity_before)])
         impacts, names, rows = motion.impacts, self.system.model.coordinates, [np.empty((0, 2))]
         for i, contact in enumerate(self.system.model.contacts):
             speeds = np.abs(impacts.velocity_before[:, names.index(contact.coordinate)])
@@ -293,6 +312,7 @@ class WholeMotionEquations(OrbitEquations):
         extremes = np.full((int(sampled is not None), SegmentColumn.LEAST_MARGIN + max(1, len(self.margins))), np.inf)
         if sampled is not None:
             extremes[:, SegmentColumn.CROSSINGS] = 0.0
+            extremes[0, SegmentColumn.LOWEST_GAP] = sampled.lowest_gap()
             extremes[0, SegmentColumn.HIGHEST], extremes[0, SegmentColumn.LOWEST] = sampled.highest(), sampled.lowest()
             least = sampled.margins() if self.margins else {}
             extremes[0, SegmentColumn.LEAST_MARGIN : SegmentColumn.LEAST_MARGIN + len(self.margins)] = [

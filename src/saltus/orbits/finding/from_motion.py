@@ -22,7 +22,6 @@ from saltus.flow import (
 from saltus.orbits.branches.images import divide, half
 from saltus.orbits.equations.contract import MotionToRead, OrbitEquations
 from saltus.orbits.equations.kinds import KINDS, equations_of
-from saltus.orbits.equations.resting import resting_near
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
 from saltus.orbits.symmetry import is_symmetric, keeps_symmetry
@@ -56,7 +55,7 @@ def find_orbit(
 ) -> PeriodicOrbit:
     """The periodic orbit on which a motion settles, or, with settle=0, the one that lies near it, stable or not.
 
-    Where impacts have a loss and the load pulls the system off its contact in every period, the orbit may be a `RestingOrbit`.
+    Where impacts have a loss and the load pulls the system off its contact in every period, the orbit may rest in between.
 
     Parameters
     ----------
@@ -196,10 +195,7 @@ def orbit_from(base: OrbitEquations, state: dict[str, Any], periods: int) -> Per
     MotionError
         The motion leads to no orbit.
     """
-    orbit = orbit_near(base, state, periods)
-    if (orbit is not None and orbit.admissible) or base.system.model.holds_coordinates:
-        return orbit
-    return resting_near(base, simulate(base.system, **state, periods=periods, dense=False), periods) or orbit
+    return orbit_near(base, state, periods)
 
 
 def orbit_near(base: OrbitEquations, state: dict[str, Any], periods: int) -> PeriodicOrbit | None:

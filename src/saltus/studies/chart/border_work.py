@@ -117,7 +117,7 @@ def unseen_folds(chart: ChartMotions, curves: Sequence[xarray.Dataset]) -> np.nd
     return np.concatenate(found)
 
 
-STABILITY_ENDS = ("LP", "PD", "BPC", "GR", "RL", "CH")  # kinds of special points, the last two of resting orbits
+STABILITY_ENDS = ("LP", "PD", "BPC", "GR", "RL", "CH")  # kinds of special points, the last two of orbits with rests
 AT_THE_END = 1e-6  # a special point within this share of the branch's range from its end is its end
 
 

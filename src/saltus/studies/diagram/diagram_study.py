@@ -13,7 +13,7 @@ from saltus.branch_tables import branch_tables
 from saltus.checks import as_numbers, check_bounds, check_count, check_step
 from saltus.errors import ParameterError, shown
 from saltus.flow import state_names
-from saltus.orbits import STEP, Branch, PeriodicOrbit, RestingOrbit, closing_rows
+from saltus.orbits import STEP, Branch, PeriodicOrbit, closing_rows
 from saltus.progress import Progress, growing, part_of, silent
 from saltus.provenance import provenance
 from saltus.public_functions import checked_by
@@ -36,7 +36,6 @@ class ConfirmationSettings:
 
     distance: float = 1e-8  # A stable orbit must come back to itself within this distance ...
     rounds: int = 20  # ... after this number of its periods.
-    instants: int = 64  # The number of instants of a period at which a resting orbit is compared with itself.
 
 
 CONFIRMATION = ConfirmationSettings()
@@ -112,21 +111,7 @@ def confirmed(branches: list[Branch], work: DiagramWork) -> list[xarray.Dataset]
 
 def _distances(orbits: list[PeriodicOrbit], rounds: int, work: DiagramWork) -> np.ndarray:
     """The distance of each orbit from itself after `rounds` of its periods, by the event-driven flow, all orbits in lanes."""
-    result = np.empty(len(orbits))
-    rests = np.array([isinstance(orbit, RestingOrbit) for orbit in orbits], dtype=bool)
-    result[rests] = [_moved(orbit, rounds) for orbit in orbits if isinstance(orbit, RestingOrbit)]
-    if not rests.all():
-        others = [orbit for orbit, rest in zip(orbits, rests, strict=True) if not rest]
-        result[~rests] = work.distances(closing_rows(others, rounds))
-    return result
-
-
-def _moved(orbit: RestingOrbit, rounds: int) -> float:
-    """The largest distance at 64 instants of a period: at one instant, the release, all resting orbits are in the same state."""
-    motion = orbit.motion((rounds + 1) * orbit.period)
-    times = motion.start + orbit.duration * (np.arange(CONFIRMATION.instants) + 0.5) / CONFIRMATION.instants
-    now, later = motion.at(times), motion.at(times + rounds * orbit.duration)
-    return float(np.abs(np.asarray(now) - np.asarray(later)).max())
+    return work.distances(closing_rows(orbits, rounds)) if orbits else np.empty(0)
 
 
 def _attractors(search: DiagramSearch) -> xarray.Dataset:
