@@ -17,7 +17,8 @@ import numpy as np
 
 from saltus.continuation import Bounds, Corrected, Course, CurveEnd, Cut, End, Evidence, TestFunction, Zero
 from saltus.errors import SaltusError
-from saltus.flow import EventCode, load_releases, peak_near
+from saltus.flow import EventCode
+from saltus.orbits.branches.beyond_rest import as_the_motion_goes_on
 from saltus.orbits.branches.bifurcations import FLIP
 from saltus.orbits.branches.images import is_image, nearest, parent_of
 from saltus.orbits.branches.orbit_curve import OrbitPoint
@@ -28,7 +29,6 @@ from saltus.orbits.equations.event_sequence import EventSequence, OrbitEvent
 from saltus.orbits.equations.read_events import section_of
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.tolerances import TOLERANCES
-from saltus.systems import arguments_of
 
 Events = tuple[OrbitEvent, ...]
 TINY = float(np.finfo(float).tiny)  # replaces a distance of 0 before a change of events, to keep the test function negative there
@@ -68,14 +68,6 @@ class OtherSideSettings:
     # the two orbits between which it was solved for lie on two branches.
     far: float = 1e-3
     same: float = 0.01  # Two orbits at one value of the parameter are the same within this share of a probe's distance.
-    # Shares of the parameter's range at which orbits are looked for beyond the end of a rest, tried in turn.
-    after_rest: tuple[float, ...] = (1e-5, 1e-4, 1e-3)
-    # Ahead of an orbit that has nearly shrunk to rest the loss of its release is looked for from this share of the range on,
-    # doubled so many times, and located to this relative precision; the peak of the pull from this phase before the release.
-    nearest_loss: float = 1e-9
-    doublings: int = 24
-    narrow: float = 1e-12
-    behind: float = 0.05
     along: float = 1e-6  # The distance to a second orbit on the branch, which gives the tangent at another section.
 
 
@@ -179,48 +171,10 @@ def beyond(cut: Cut, points: Sequence[OrbitPoint]) -> OrbitPoint | Restart | End
     born = parent_of(cut.point) is not None  # at the parent's orbit rounding decides which events are found: exclude none
     sequence = None if born else events_at(cut.point).sequence
     if cut.special is not None and cut.special.kind == SpecialKind.CH:
-        return _as_the_motion_goes_on(cut.point)
+        return as_the_motion_goes_on(cut.point)
     if _section_comes(cut.point):
         return _from_another_section(cut.point) or End(OrbitEnd.NO_SECTION, cut.point.parameter)
     return other_events(cut.point, sequence, points)
-
-
-def _as_the_motion_goes_on(point: OrbitPoint) -> Restart:
-    """Beyond the end of a rest: the impacts no longer die away, and the orbit has many of them. Ever more of them towards the end
-    of the rest, where grazings accumulate, so that the branch goes on from a little farther ahead."""
-    way = point.tangent[-len(point.parameters) :]
-    way = way / np.linalg.norm(way / np.array(point.curve.scales))
-    state = arguments_of(point.orbit.system, point.orbit.section_state)
-    values = [point.parameters + distance * way for distance in SETTINGS.after_rest]
-    return Restart(state, values, End(OrbitEnd.REST_VANISHES, point.parameter))
-
-
-def last_release(point: OrbitPoint) -> SpecialPoint | None:
-    """The parameter ahead of an orbit that has nearly shrunk to rest at which the load only just pulls a single contact open
-    (RL); None where it is not near."""
-    from scipy.optimize import brentq
-
-    equations, orbit, value = point.curve.equations, point.orbit, point.parameter
-    known = load_releases(orbit.system)
-    if orbit.system.model.holds_coordinates or not known:
-        return None
-
-    def pull(at: float) -> float:
-        """The least of the peaks of the pull after these releases, with the parameter at a value."""
-        system, turns = equations.system_at(np.array([at])), [(release, release.time * orbit.frequency) for release in known]
-        return min(peak_near(system, release.side, phase - SETTINGS.behind) for release, phase in turns)
-
-    reach, before = SETTINGS.nearest_loss * point.curve.scales[0], pull(value)
-    for _ in range(SETTINGS.doublings):
-        beyond = value + reach * np.sign(point.tangent[-1])
-        if (after := pull(beyond)) < 0.0:
-            narrow = SETTINGS.narrow * abs(beyond)
-            lost = float(brentq(pull, value, beyond, xtol=narrow, rtol=1e-15))
-            place = np.append(point.place[:-1], lost)
-            evidence = Evidence(point.residual, (narrow,), before, after, pull(lost))
-            return SpecialPoint(SpecialKind.RL, replace(point, place=place), evidence)
-        reach *= 2.0
-    return None
 
 
 def other_events(point: OrbitPoint, sequence: Events | None, points: Sequence[OrbitPoint] = ()) -> OrbitPoint | End:

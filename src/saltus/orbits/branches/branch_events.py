@@ -20,7 +20,7 @@ from saltus.orbits.branches.images import (
     passes_image,
     repetition,
 )
-from saltus.orbits.branches.orbit_curve import SMALLEST, STEEPEST, OrbitPoint
+from saltus.orbits.branches.orbit_curve import SHRUNK_TO_REST, STEEPEST, OrbitPoint
 from saltus.orbits.branches.special_point import OrbitEnd, OrbitMissed, SpecialKind, UserFunction
 from saltus.orbits.equations.contract import Restart
 from saltus.orbits.equations.kinds import equations_of
@@ -65,7 +65,7 @@ class OrbitEvents(Events):
         amplitude = ahead.orbit.amplitude
         if amplitude > SETTINGS.largest * max(1.0, run.points[0].orbit.amplitude):
             return End(OrbitEnd.GROWS, ahead.parameter, detail=f"{amplitude:.3g}")
-        if amplitude >= SMALLEST:
+        if amplitude >= SHRUNK_TO_REST:
             return None
         lost = ahead.orbit.equations.lost_ahead(ahead)
         if lost is None:

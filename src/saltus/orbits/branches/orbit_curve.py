@@ -16,7 +16,7 @@ from saltus.orbits.orbit import PeriodicOrbit
 
 # With a multiplier above this, neighbouring motions separate so fast that an orbit cannot be solved for.
 STEEPEST = 1e8
-SMALLEST = 1e-7  # An orbit of an amplitude below this has shrunk to rest.
+SHRUNK_TO_REST = 1e-7  # An orbit of an amplitude below this has shrunk to rest.
 
 
 @dataclass(frozen=True, eq=False)

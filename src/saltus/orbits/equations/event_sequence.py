@@ -36,7 +36,7 @@ class EventSettings:
 
 
 SETTINGS = EventSettings()
-AT_REST = 2  # the mode of a single contact at rest; on its sides -1 and +1 the mode is 1 and 3
+RESTING_MODE = 2  # the mode of a single contact at rest; on its sides -1 and +1 the mode is 1 and 3
 
 
 class OrbitEvent(NamedTuple):
@@ -139,7 +139,7 @@ def _groups(motion: Motion) -> tuple[Group, ...]:
 def _image(event: OrbitEvent, model: Model, images: Sequence[int]) -> OrbitEvent:
     """The mirror image of an event."""
     if not model.holds_coordinates:
-        return event._replace(mode=2 * AT_REST - event.mode)
+        return event._replace(mode=2 * RESTING_MODE - event.mode)
     closed, slides = modes_of(model, np.array(event.mode))
     count, mode = len(model.contacts), 1
     for i, image in enumerate(images):
@@ -166,7 +166,7 @@ def _listed(motion: Motion) -> tuple[list[OrbitEvent], np.ndarray, np.ndarray]:
     if dense is None or not times.size:
         return [], times, speeds[chosen]
     modes = dense.side[np.searchsorted(dense.start, times, side="right") - 1]
-    modes = modes if motion.system.model.holds_coordinates else modes + AT_REST
+    modes = modes if motion.system.model.holds_coordinates else modes + RESTING_MODE
     events = [OrbitEvent(*numbers) for numbers in np.column_stack([codes, modes]).tolist()]
     return events, times, speeds[chosen]
 

@@ -38,12 +38,12 @@ from saltus.orbits.branches.beyond_events import (
     events_of,
     first_step,
     jump_over,
-    last_release,
     parent_at,
     refused_beyond,
     same_events,
     stalled_at,
 )
+from saltus.orbits.branches.beyond_rest import last_release
 from saltus.orbits.branches.images import nearest
 from saltus.orbits.branches.orbit_curve import STEEPEST, OrbitPoint
 from saltus.orbits.branches.special_point import OrbitEnd
