@@ -13,7 +13,7 @@ from saltus.flow.kernel.layout import CHATTER_SPEED, SLOW, Status
 from saltus.flow.lanes import threads
 from saltus.flow.lanes.function_types import SCALAR_MOTION
 from saltus.systems import EnergyRestitution, Load, System, VelocityReduction, WallOscillator
-from saltus.taylor import pointer, pointers
+from saltus.taylor import pointer
 from saltus.taylor.private_numba import OPTIONS
 
 TOL = 1e-10
@@ -26,9 +26,8 @@ assert THRESHOLD > 2 * CHATTER_SPEED
 def no_scalar_kernel(monkeypatch):
     """A motion that leaves the lanes ends at once, as one that is out of range."""
     helpers = threads.load_helpers()
-    with pointers():
-        end = njit(SCALAR_MOTION, **{**OPTIONS, "no_cpython_wrapper": True})(lambda lane: (ENDED, 0))
-        monkeypatch.setattr(threads, "load_helpers", lambda several: (*helpers[:2], pointer(end)))
+    end = njit(SCALAR_MOTION, **{**OPTIONS, "no_cpython_wrapper": True})(lambda lane: (ENDED, 0))
+    monkeypatch.setattr(threads, "load_helpers", lambda several: (*helpers[:2], pointer(end)))
 
 
 def ball(speed, e=1.0):

@@ -412,3 +412,26 @@ def test_motion_that_leaves_the_range_of_numbers_is_refused_with_the_instant():
     runaway = System(model=Runaway(), load=Load(frequency=1.0, force=Harmonic(0.0)))
     with pytest.raises(MotionError, match=r"the motion leaves the range of numbers at time (7[01]\d)"):  # e^709 is the largest
         simulate(runaway, x=1.0, velocity=1.0, duration=1000.0, dense=False)
+
+
+def test_a_stiff_motion_that_does_not_fit_into_memory_is_refused_with_what_helps(monkeypatch):
+    """Its steps are so short that forcing periods say nothing about the memory."""
+    from saltus.checks import Limits
+    from saltus.errors import MotionError
+
+    monkeypatch.setattr("saltus.flow.motion.recorder.LIMITS", Limits(any_machine=1e5))
+    monkeypatch.setattr("saltus.flow.motion.recorder.free_memory", lambda: 2e6)
+    stiff = WALL.with_({"model.damping": 1e5})
+    with pytest.raises(MotionError, match=r"GB of memory, and 0\.002 GB are left; give times=\.\.\."):
+        simulate(stiff, x=0.1, duration=1.0)
+    simulate(stiff, x=0.1, duration=1.0, times=[1.0])
+
+
+@pytest.mark.parametrize("far", [1e6, 1e9, 1e12])
+def test_the_phase_far_from_0_is_that_of_the_rounded_time(far):
+    """As the docstring says: two starts one period apart differ by the rounding of the time, and not by more."""
+    period = 2 * math.pi / WALL.load.frequency
+    start = round(far / period) * period
+    near = simulate(WALL, x=0.3, velocity=0.0, periods=2, dense=False)
+    moved = simulate(WALL, x=0.3, velocity=0.0, periods=2, dense=False, time=start)
+    assert abs(moved.position - near.position) < 4 * math.ulp(far) + 1e-12

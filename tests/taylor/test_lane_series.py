@@ -17,7 +17,7 @@ from saltus.flow.lanes.function_types import LANE_SERIES
 from saltus.flow.lanes.memory import SLOTS
 from saltus.flow.lanes.threads import lane_order
 from saltus.systems import Harmonic, Load, Model, Record, System, WallOscillator
-from saltus.taylor import private_numba as jit
+from saltus.taylor import written_type
 from saltus.taylor.graph import RECORD_WIDTH
 from saltus.taylor.vectors import WIDTH
 
@@ -43,7 +43,6 @@ class Many(Model):
 
     coordinates: ClassVar[tuple[str, ...]] = tuple(f"x{i}" for i in range(len(NAMES) + len(OF_RECORD)))
     channels: ClassVar[tuple[str, ...]] = ("force", "pulse")
-    sides: ClassVar[tuple[int, ...]] = ()
 
     def acceleration(self, t, position, velocity, side, load):
         states = list(zip(position, velocity, strict=True))
@@ -58,9 +57,7 @@ class LaneSeries:
     def __init__(self, system):
         self.run = program(system)
         self.plan, (self.function, *_) = load_lane_functions(self.run.trace)
-        with jit.pointers():
-            kind = jit.function_type(LANE_SERIES)
-            self.call = njit(types.void(kind, types.float64[::1], types.int64))(_call)
+        self.call = njit(types.void(written_type(LANE_SERIES), types.float64[::1], types.int64))(_call)
 
     def coefficients(self, states, order):
         """Of positions, velocities, accelerations, shape (lanes, coordinates, STRIDE); `states` = (t, positions, velocities)."""

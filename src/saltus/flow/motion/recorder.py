@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from saltus.checks import LIMITS, free_memory
 from saltus.errors import MotionError
 from saltus.flow.contacts.events import ContactEvents
 from saltus.flow.kernel.memory import EventBuffers, StepBuffers
@@ -75,10 +76,22 @@ class Recorder:
                     f"more than {MOST.steps} steps before time {piece.end:.6g}, too many to be kept; give times=... to keep "
                     "the states at those times instead, or dense=False to keep the events alone"
                 )
+            self._check_memory(piece)
             return
         self._sample(piece, int(np.searchsorted(self._times, piece.end, side="left")))
         self._check.add(piece)
         self._pieces = [piece]
+
+    def _check_memory(self, piece: DenseOutput) -> None:
+        """Refuse to keep more steps than there is room for; at the end all of them are copied once. Steps of stiff motions are so
+        short that the number of forcing periods says nothing about it."""
+        size = self._kept / piece.start.size * sum(a.nbytes for a in (piece.start, piece.length, piece.side, piece.series))
+        free = free_memory() if size > LIMITS.any_machine else np.inf
+        if size > LIMITS.memory * free:
+            raise MotionError(
+                f"the steps before time {piece.end:.6g} take {size / 1e9:.3g} GB of memory, and {free / 1e9:.3g} GB are left; "
+                "give times=... to keep the states at those times instead, or dense=False to keep the events alone"
+            )
 
     def _sample(self, piece: DenseOutput, stop: int) -> None:
         assert self._times is not None

@@ -51,7 +51,8 @@ def simulate(
     tol
         The error that one step may make, relative to the state, in [1e-15, 1e-6].
     time
-        The dimensionless time at the start.
+        The dimensionless time at the start. As any number it is rounded to 1e-16 of its size, and the phase of the load with it:
+        far from 0 (6e-11 at 1e6, 1e-4 at 1e12) give the time within a forcing period instead.
     side
         The side, +1 or -1, to which the motion goes from rest at the contact if that is not unique.
     stop_at
