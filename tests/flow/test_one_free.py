@@ -39,7 +39,7 @@ def test_the_one_equation_is_the_models_with_all_others_held(name):
         a = substitute(equations.acceleration, leaves).value
         assert abs(a - expected[j]) < 1e-13
         forces = reactions(system.model, t, q, v, expected, system.load)
-        closed = [force for force, coordinate in zip(forces, traced.held, strict=True) if coordinate != j]
+        closed = [force for force, coordinate in zip(forces, traced.contact_coordinates, strict=True) if coordinate != j]
         for half, rest, force in zip(equations.curved, equations.guards, closed, strict=False):
             slope = differentiate(half, q0)
             curved = substitute(slope, leaves).value * a + substitute(differentiate(slope, q0), leaves).value * v[j] ** 2

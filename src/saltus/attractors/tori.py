@@ -69,9 +69,9 @@ def excludes_tori(system: System) -> str | None:
 def _continuous(system: System) -> str | None:
     """Why the stroboscopic map is continuous, as a part of a sentence; None if the contact may push away on both sides."""
     traced = trace(system)
-    if traced.sides == 0:
+    if traced.side_count == 0:
         return "the motion has no contact"
-    if traced.sides == 1:
+    if traced.side_count == 1:
         return "a bounce from one wall joins its states before and after without a gap"
     if contact_regularity(traced, tuple(system.parameters.values())) is ContactRegularity.CONTINUOUS:
         return "neither the velocity nor the acceleration changes at the contact"

@@ -122,7 +122,7 @@ def _law_of(system: System) -> tuple[Trace, _Law | None]:
     key = structure_key(system)
     if key not in _laws:
         traced = trace(system)
-        _laws[key] = traced, _Law(traced) if traced.sides else None
+        _laws[key] = traced, _Law(traced) if traced.side_count else None
     return _laws[key]
 
 
@@ -144,9 +144,11 @@ def keeps_rest(system: System, given: Mapping[str, np.ndarray]) -> np.ndarray:
     arrays = (given.get(path, np.asarray(value)) for path, value in system.parameters.items())
     columns = np.broadcast_arrays(*map(np.atleast_1d, arrays))
     size = columns[0].size if columns else 1
-    if traced.records or sorted(traced.held) != list(range(traced.dof)):
+    if traced.records or sorted(traced.contact_coordinates) != list(range(traced.dof)):
         return np.zeros(size, dtype=bool)
-    state = {Expr("coordinate", (), i): position for i, position in zip(traced.held, traced.positions, strict=True)}
+    state = {
+        Expr("coordinate", (), i): position for i, position in zip(traced.contact_coordinates, traced.positions, strict=True)
+    }
     state |= {Expr(op, (), i): number(0.0) for op in ("velocity", "acceleration") for i in range(traced.dof)}
     always = Leaves([Interval(c[None, :]) for c in columns], [])
     frequency = next((i for i, path in enumerate(traced.parameters) if path == "load.frequency"), None)
@@ -188,12 +190,12 @@ class _Law:
     """The expressions of a system near its contact, and the bounds that follow from them for many parameter sets."""
 
     def __init__(self, traced: Trace) -> None:
-        sides = (1, -1)[: traced.sides]
-        self.sides = {s: Opening(traced, s) for s in sides}
+        sides = (1, -1)[: traced.side_count]
+        self.openings = {s: Opening(traced, s) for s in sides}
         pairs = {s: _factor(traced, s) for s in sides}
         self.cycles = _cycles({s: following for s, (following, _, _) in pairs.items()})
         self.factors = {s: [factor, at_rest] for s, (_, factor, at_rest) in pairs.items()}
-        accelerations = [side.a for side in self.sides.values()]
+        accelerations = [side.a for side in self.openings.values()]
         self.recorded = any(reads(a, "record") for a in accelerations)
         self.timed = any(reads(a, "time") for a in accelerations)
         self.by_speed = any(reads(f, "velocity") for f, _ in self.factors.values())
@@ -251,7 +253,9 @@ class _Law:
         steady, alive = np.full(limit.shape, not self.recorded), impacts.loss >= 0
         for side in cycle:
             here = replace(always, stretch=Interval(impacts.stretch[side]))
-            change, pull = enclose([self.sides[side].a_t, self.sides[side].jets[0][0]], replace(everywhere, stretch=here.stretch))
+            change, pull = enclose(
+                [self.openings[side].a_t, self.openings[side].jets[0][0]], replace(everywhere, stretch=here.stretch)
+            )
             steady &= (change.lo == 0) & (change.hi == 0)
             alive &= pull.lo > 0
         speed = np.where(alive & (steady | (impacts.loss > 0)), limit, 0.0)
@@ -264,7 +268,7 @@ class _Law:
 
     def _by_energy(self, side: int, leaves: Leaves, loss: Any, steady: Any, limit: Any) -> Any:
         """The speed up to which flights on one side, with the impact after, lose energy."""
-        a, a_w, a_u = (getattr(self.sides[side], name) for name in ("a", "a_w", "a_u"))
+        a, a_w, a_u = (getattr(self.openings[side], name) for name in ("a", "a_w", "a_u"))
         allowed = np.where(steady, np.inf, np.exp(2 * loss) * (1 - SLACK))
         rise, bend = (enclosed_along(e, leaves, OPENING) for e in (a, a_w))
         turning, lo, hi = climb(lambda w: -rise(w), lambda w: -bend(w), allowed)
@@ -278,17 +282,17 @@ class _Law:
         """The speed from the corrected adiabatic invariant, for the chosen parameter sets, (1, chosen.size)."""
         result = np.zeros((1, chosen.size))
         here = [replace(always, stretch=Interval(impacts.stretch[s])).only(chosen) for s in cycle]
-        pulls = [enclose([self.sides[s].jets[0][0]], self._in_cells(x))[0] for s, x in zip(cycle, here, strict=True)]
+        pulls = [enclose([self.openings[s].jets[0][0]], self._in_cells(x))[0] for s, x in zip(cycle, here, strict=True)]
         alive = np.flatnonzero(reduce(np.minimum, [(p.lo + result).min(axis=0) for p in pulls]) > 0)
         if not alive.size:  # the load lifts the system off everywhere; bounds of no parameter sets take as long as those of a few
             return result
         here = [self._in_cells(x.only(alive)) for x in here]
-        bounds = [self.sides[s].bounds(x) for s, x in zip(cycle, here, strict=True)]
+        bounds = [self.openings[s].bounds(x) for s, x in zip(cycle, here, strict=True)]
         forms = [normal_form(side, None if len(cycle) == 1 else bounds[1 - i]) for i, side in enumerate(bounds)]
         loss, period = impacts.loss[:, chosen[alive]], np.atleast_1d(here[0].time.hi)[-1:]
         top = np.minimum(first_guess(forms, loss), limit[:, chosen[alive]])
         for v in (fraction * top for fraction in CAPTURE.boxes):
-            boxes = [self.sides[s].boxed(x, f.pull, v) for s, x, f in zip(cycle, here, forms, strict=True)]
+            boxes = [self.openings[s].boxed(x, f.pull, v) for s, x, f in zip(cycle, here, forms, strict=True)]
             budgets = [budget(form, box, v) for form, box in zip(forms, boxes, strict=True)]
             found = largest_start(budgets, loss, period, v)
             result[:, alive] = np.where(result[:, alive] > 0, result[:, alive], found)
@@ -309,7 +313,7 @@ def _factor(traced: Trace, side: int) -> tuple[int, Expr, Expr]:
     assert traced.next_side is not None
     assert traced.velocity_after is not None
     following = substitute(traced.next_side, leaf)
-    if following.op != "number" or following.value not in (1.0, -1.0)[: traced.sides]:
+    if following.op != "number" or following.value not in (1.0, -1.0)[: traced.side_count]:
         return 0, number(np.nan), number(np.nan)
     rate, next_rate = (substitute(traced.gap_rate, {Expr("side"): s}) for s in (float(side), following.value))
     after = substitute(traced.velocity_after, leaf)

@@ -51,7 +51,7 @@ def _cells(system: System) -> Interval:
 
 
 def _sides(traced: Trace) -> tuple[int, ...]:
-    return (1, -1)[: traced.sides] or (1,)
+    return (1, -1)[: traced.side_count] or (1,)
 
 
 def _loses(traced: Trace, leaves: Leaves) -> bool:

@@ -102,7 +102,7 @@ class Trace:
     columns: int = 0
     paths: tuple[str, ...] = ()  # of the parameters that the last columns are derivatives to
     records: list[tuple[str, int]] = field(default_factory=list)  # dotted path, order of the derivative (see `load_tables.py`)
-    sides: int = 0  # of the contact
+    side_count: int = 0  # of the contact
     acceleration: list[Expr] = field(default_factory=list)
     gap: Expr | None = None
     gap_rate: Expr | None = None
@@ -117,14 +117,14 @@ class Trace:
     restitution: list[Expr] = field(default_factory=list)
     positions: list[Expr] = field(default_factory=list)
     signs: tuple[int, ...] = ()  # of the contacts
-    held: tuple[int, ...] = ()  # the coordinate that each contact holds
+    contact_coordinates: tuple[int, ...] = ()  # the coordinate that each contact holds
     ground_speeds: list[Expr] = field(default_factory=list)
-    rubbed: tuple[int, ...] = ()  # the coordinate of each friction
+    friction_coordinates: tuple[int, ...] = ()  # the coordinate of each friction
 
     @property
     def several(self) -> bool:
         """Whether there are contacts or frictions that may hold its coordinates, one by one."""
-        return bool(self.signs or self.rubbed)
+        return bool(self.signs or self.friction_coordinates)
 
     @property
     def contact_numbers(self) -> list[Expr]:
@@ -151,7 +151,7 @@ def trace(system: System, stop_at: tuple[str, ...] = (), sensitivities: tuple[st
         The model does not have a margin, or a path leads to no number.
     """
     paths = None if sensitivities is None else tangent.check_paths(system, sensitivities)
-    result = Trace(model=type(system.model).__name__, sides=len(system.model.sides), dof=len(system.model.coordinates))
+    result = Trace(model=type(system.model).__name__, side_count=len(system.model.sides), dof=len(system.model.coordinates))
     twin = substitute_numbers(system, result.symbol)
     _name_records(twin.load)
     object.__setattr__(twin, "load", DeclaredLoad(twin.load, twin.model))
@@ -270,12 +270,12 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
     holding = [*reactions(model, t, q, v, accelerations, load), *stick_margins(model, t, q, v, accelerations, load)]
     result.reactions = [combine("add", r, 0.0) for r in holding]
     result.ground_speeds = [combine("add", friction.ground_speed, 0.0) for friction in model.frictions]
-    result.rubbed = tuple(model.coordinates.index(friction.coordinate) for friction in model.frictions)
+    result.friction_coordinates = tuple(model.coordinates.index(friction.coordinate) for friction in model.frictions)
     result.mass = [combine("add", entry, 0.0) for row in mass for entry in row]
     result.restitution = [combine("add", entry, 0.0) for row in twin.impact.restitution_matrix(model) for entry in row]
     result.positions = [combine("add", contact.position, 0.0) for contact in model.contacts]
     result.signs = tuple(contact.sign for contact in model.contacts)
-    result.held = tuple(model.coordinates.index(contact.coordinate) for contact in model.contacts)
+    result.contact_coordinates = tuple(model.coordinates.index(contact.coordinate) for contact in model.contacts)
     return constrained_acceleration(model, t, q, v, load, free, slides)
 
 

@@ -101,7 +101,7 @@ class _TangentGroup:
         self._states[:, [0, 3]] = states
         self._states[:, [1, 2, 4, 5]] = first_frame(2).ravel()
         self._alive = np.isfinite(states).all(axis=1)
-        self._rounding = LYAPUNOV.rounding if ensemble.held else 0.0
+        self._rounding = LYAPUNOV.rounding if ensemble.holds_coordinates else 0.0
 
     def period(self, spans: int) -> np.ndarray:
         """Go on for a period; returns ln of the stretch in it, (n, 2)."""

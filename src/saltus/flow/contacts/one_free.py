@@ -36,14 +36,19 @@ def equations_of_one_free(trace: Trace, margins: list[Expr]) -> OneFree | None:
     trace with a tangent, because the derivatives of the other coordinates need not be constant.
     """
     own = trace.dof
-    if len(trace.signs) < 2 or trace.rubbed or sorted(trace.held) != list(range(own)) or trace.columns:
+    if (
+        len(trace.signs) < 2
+        or trace.friction_coordinates
+        or sorted(trace.contact_coordinates) != list(range(own))
+        or trace.columns
+    ):
         return None
     common = CommonForm([Expr("free", (), j) for j in range(own)])
     accelerations, curved, changing, constant = [], [], [], []
     for j in range(own):
         leaves = _leaves(trace, j)
         accelerations.append(substitute(trace.acceleration[j], leaves))
-        others = [root for root, coordinate in zip(trace.reactions, trace.held, strict=True) if coordinate != j]
+        others = [root for root, coordinate in zip(trace.reactions, trace.contact_coordinates, strict=True) if coordinate != j]
         halves = [_halves(common, substitute(root, leaves | _accelerations(own, j)), accelerations[j]) for root in others]
         curved.append([half for half, _ in halves])
         limits = [substitute(root, leaves) for root in margins]
@@ -71,7 +76,7 @@ def _accelerations(own: int, j: int) -> dict[Expr, Expr]:
 def _leaves(trace: Trace, j: int) -> dict[Expr, Expr]:
     """The substitution for coordinates, velocities and `free` if only coordinate j is free."""
     leaves = {}
-    for i, position in zip(trace.held, trace.positions, strict=True):
+    for i, position in zip(trace.contact_coordinates, trace.positions, strict=True):
         leaves[Expr("coordinate", (), i)] = Expr("coordinate", (), 0) if i == j else position
         leaves[Expr("velocity", (), i)] = Expr("velocity", (), 0) if i == j else number(0.0)
         leaves[Expr("free", (), i)] = number(1.0 if i == j else 0.0)

@@ -30,7 +30,7 @@ class ContactState(KernelState):
         """
         start = super().at_start(request, run)
         names, position, speeds = request.system.model.coordinates, request.position, request.speeds
-        held, rubbed = run.trace.held, run.trace.rubbed
+        held, rubbed = run.trace.contact_coordinates, run.trace.friction_coordinates
         contacts = np.zeros((len(held) + len(rubbed), len(ContactColumn)), dtype=np.int64)
         contacts[:, ContactColumn.COORDINATE] = held + rubbed
         for row, contact in zip(contacts[: len(held)], request.system.model.contacts, strict=True):

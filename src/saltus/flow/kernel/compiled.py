@@ -184,7 +184,7 @@ def load_structure(trace: Trace) -> Structure:
     several = ("series", "matrices", "matrix_slopes", "tangent")
     names = several if trace.several else ("series", "contact_series", "reset", "contact_damping", "tangent")
     stops, steep = len(trace.reactions) + len(trace.margins), int(is_steep(trace.acceleration))
-    sizes = Sizes(len(trace.acceleration), stops, 1, trace.sides, steep, trace.dof, trace.columns)
+    sizes = Sizes(len(trace.acceleration), stops, 1, trace.side_count, steep, trace.dof, trace.columns)
     return Structure(
         sizes,
         max(1, len(constants(trace))),
@@ -192,7 +192,7 @@ def load_structure(trace: Trace) -> Structure:
         (made["constants"], made["matrices" if trace.several else "geometry"]),
         trace.several,
         trace.signs,
-        len(trace.rubbed),
+        len(trace.friction_coordinates),
     )
 
 
@@ -278,7 +278,7 @@ def _series(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
 def _free(trace: Trace) -> dict[str, tuple[str, int]]:
     """The places behind the parameters that hold in which direction each friction slides, and whether each coordinate is free."""
     first = len(trace.parameters)
-    return {"slide": ("parameters", first), "free": ("parameters", first + len(trace.rubbed))}
+    return {"slide": ("parameters", first), "free": ("parameters", first + len(trace.friction_coordinates))}
 
 
 def _contact_series(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:

@@ -41,7 +41,7 @@ class SegmentFollower:
         self, numbers: tuple[Any, Any], request: tuple[Any, ...], with_extremes: bool = False
     ) -> ContactsSegmentResults | None:
         """The same for a model with several contacts and the segments of a `ContactsSegmentRequest`."""
-        held, n, own = self._run.trace.held, len(request[0]), self.own
+        held, n, own = self._run.trace.contact_coordinates, len(request[0]), self.own
         contacts = np.zeros((len(held), len(ContactColumn)), dtype=np.int64)
         contacts[:, ContactColumn.COORDINATE] = held
         ends, columns = np.zeros((n, SegmentEnd.NUMBERS + 10 * own)), np.zeros((n, 2 * own + 1, self._columns))

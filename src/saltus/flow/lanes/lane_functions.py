@@ -21,7 +21,7 @@ def memory_plan(trace: Trace) -> MemoryPlan:
         own=trace.dof,
         parameters=max(0 if trace.several else 1, len(trace.parameters)),
         contacts=len(trace.signs),
-        frictions=len(trace.rubbed),
+        frictions=len(trace.friction_coordinates),
         constants=max(1, len(constants(trace))),
         records=len(trace.records),
         stops=len(trace.reactions) + len(trace.margins),

@@ -220,7 +220,7 @@ class Lanes:
     def _group(self, control: np.ndarray) -> LaneGroup:
         """A group of lanes for one thread, still without work; `control` = [whether to stop, forcing periods done so far]."""
         trace, own, plan = self.program.trace, self.own, self.plan
-        contacts, frictions = len(trace.signs), len(trace.rubbed)
+        contacts, frictions = len(trace.signs), len(trace.friction_coordinates)
         numbers = own * own + contacts * contacts + contacts + frictions if self.several else 3
         nothing = np.zeros((0, 0))
         return LaneGroup(
@@ -249,7 +249,12 @@ class Lanes:
         trace, own = self.program.trace, self.own
         contacts = len(trace.signs)
         rows = np.zeros((contacts, ContactColumn.WAITS + 1), dtype=np.int64)
-        return np.zeros(1, dtype=MOTION), np.zeros(2 * own), rows, solver_arrays(own, contacts, 0, len(trace.rubbed))
+        return (
+            np.zeros(1, dtype=MOTION),
+            np.zeros(2 * own),
+            rows,
+            solver_arrays(own, contacts, 0, len(trace.friction_coordinates)),
+        )
 
     def _sizes(self) -> LaneSizes:
         """The numbers of the structure, and of what is asked for."""
@@ -275,8 +280,8 @@ class Lanes:
             guards=plan.guards or 0,
             constant_guards=plan.constant_guards,
             contacts=len(trace.signs),
-            frictions=len(trace.rubbed),
-            coordinates=np.array([*trace.held, *trace.rubbed], dtype=np.int64),
+            frictions=len(trace.friction_coordinates),
+            coordinates=np.array([*trace.contact_coordinates, *trace.friction_coordinates], dtype=np.int64),
             signs=np.array(trace.signs, dtype=np.int64),
         )
 

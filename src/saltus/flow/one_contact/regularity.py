@@ -37,7 +37,7 @@ def contact_regularity(traced: Trace, values: tuple[float, ...], free: tuple[str
     JUMP and CONTINUOUS are proved in exact arithmetic (`taylor/exact_algebra.py`); if no proof is found, the result is IMPACT or
     JUMP. Without a contact it is CONTINUOUS.
     """
-    if traced.sides == 0:
+    if traced.side_count == 0:
         return ContactRegularity.CONTINUOUS
     leaves = {
         Expr("parameter", (), i): constant(value)
@@ -45,7 +45,7 @@ def contact_regularity(traced: Trace, values: tuple[float, ...], free: tuple[str
         if path not in free
     }
     try:
-        if traced.sides == 1 or not all(_passes(traced, leaves, side) for side in (1, -1)):
+        if traced.side_count == 1 or not all(_passes(traced, leaves, side) for side in (1, -1)):
             return ContactRegularity.IMPACT
         equal = _contact_acceleration(traced, leaves, 1) == _contact_acceleration(traced, leaves, -1)
     except NoNormalForm:

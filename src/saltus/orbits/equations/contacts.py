@@ -115,7 +115,11 @@ class ContactsEquations(OrbitEquations):
     @cached_property
     def _free(self) -> np.ndarray:
         """The places of the free coordinates and velocities in the state at the start."""
-        held = {self._run.trace.held[i] for i in range(len(self._run.trace.held)) if self.plan[0, SegmentPlan.ALONG] >> i & 1}
+        held = {
+            self._run.trace.contact_coordinates[i]
+            for i in range(len(self._run.trace.contact_coordinates))
+            if self.plan[0, SegmentPlan.ALONG] >> i & 1
+        }
         free = [i for i in range(self.own) if i not in held]
         return np.array([*free, *(self.own + i for i in free)], dtype=int)
 
@@ -299,7 +303,7 @@ class ContactsEquations(OrbitEquations):
     def _with_held(self, state: np.ndarray, closed: int, values: np.ndarray) -> np.ndarray:
         """A state put exactly onto the contacts that are closed, and onto those that it touches without speed, up to rounding."""
         for i, contact in enumerate(self.system_at(values).model.contacts):
-            pair = [self._run.trace.held[i], self.own + self._run.trace.held[i]]
+            pair = [self._run.trace.contact_coordinates[i], self.own + self._run.trace.contact_coordinates[i]]
             if closed >> i & 1 or max(abs(contact.gap(state[pair[0]])), abs(state[pair[1]])) < TOLERANCES.touch:
                 state[pair] = float(contact.position), 0.0
         return state
