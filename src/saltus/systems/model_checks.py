@@ -21,7 +21,6 @@ OWN_PARTS = {
     ContactModel: ("contacts", "frictions", "force", "mass_matrix", "normal_forces", "transfers"),
 }
 OFF_CONTACT = 1e-9  # the largest gap at the contact, relative to its rate, that may be rounding; an error of a model is larger
-SLOW = 1e-3  # a speed at which the sign of a velocity after an impact is looked at: a law may have no meaning for fast impacts
 PROBE = (0.37, 0.21, 0.13)  # time, coordinate and velocity at which a model's answers are counted: any numbers would do
 
 
@@ -95,7 +94,7 @@ def check_contact(model: OneContactModel, impact: ImpactLaw) -> None:
             raise ParameterError(
                 f"{name}.gap must be 0 at {name}.contact = {point:g}, got {at:g} on side {side}; give both", "model"
             )
-        before = -math.copysign(SLOW, rate)
+        before = -math.copysign(PROBE[2], rate)  # a slow impact: a law may have no meaning for fast ones
         answer = _asked(model, "reset", 0.0, before, side, Load(), impact)
         if answer is None:
             continue
