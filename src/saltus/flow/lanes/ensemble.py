@@ -220,9 +220,9 @@ class TangentEnsemble:
         run = program(system, limits, ())
         self._lanes = compiled_lanes(system, run, options, 1)
         self._columns = {places.index(path): values for path, values in parameters.items()}
-        self._lengths, self.held = lengths, system.model.holds_coordinates
+        self._lengths, self.holds_coordinates = lengths, system.model.holds_coordinates
         self._records = record_tables(system, run.trace.records, {})
-        compile_everything(self.held)  # here, not in each thread that advances some of the motions
+        compile_everything(self.holds_coordinates)  # here, not in each thread that advances some of the motions
 
     def advance(self, rows: np.ndarray, states: np.ndarray, begin: np.ndarray, end: np.ndarray) -> Advanced:
         """Advance the motions of these numbers between two local times of a forcing period, (n,) each, on this thread.
