@@ -3,7 +3,8 @@
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 
-from saltus.flow.kernel.compiled import load_contact_segments, load_contacts_kernel, load_kernel, load_segments
+from saltus.flow.kernel.compiled import load_contacts_kernel, load_kernel
+from saltus.flow.kernel.orbit_segments import load_contact_segments, load_segments
 from saltus.flow.lanes.compiled_lanes import load_driver, load_helpers
 
 # The kernels that all models share, those that take longest first.

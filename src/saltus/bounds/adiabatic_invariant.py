@@ -18,7 +18,7 @@ continuous at an impact without loss; at an impact with the factor f < 1 it chan
     dL/dt <= -kappa(t) + v^2 M(t),
 
 where M bounds the terms that h2 leaves, with the exact S: interval bounds over cells of the time and all x, w <= v^2 / (2 alpha).
-ln J = 3 ln v + ln G is the adiabatic invariant, and exp(-kappa t) its known decay (see `chatter.py`).
+ln J = 3 ln v + ln G is the adiabatic invariant, and exp(-kappa t) its known decay (see `flow/one_contact/impacts.py`).
 """
 
 from __future__ import annotations

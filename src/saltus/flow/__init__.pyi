@@ -1,9 +1,7 @@
 from .contacts.layout import ContactColumn, SegmentEnd, SegmentExtremes, SegmentPlan
-from .contacts.modes import modes_of
-from .kernel.compiled import load_segments
 from .kernel.layout import SegmentColumn, SegmentValue
 from .kernel.memory_layout import EventCode
-from .kernel.orbit_segments import SegmentFollower
+from .kernel.orbit_segments import SegmentFollower, load_segments
 from .kernel.structures import Program, limits_of, program, taylor_order
 from .lanes.capture_speeds import captured_between
 from .lanes.compiled_lanes import load_advance, load_driver, load_helpers
@@ -27,14 +25,12 @@ from .long_time.recurrence import (
     return_distances,
     return_period,
 )
-from .motion.dataset import rate_name, state_names
-from .motion.dense_output import DenseOutput
-from .motion.motion import Event, EventKind, Impacts, Motion
+from .motion.events import Event, EventKind, Impacts, Stop, modes_of
+from .motion.motion import Motion, rate_name, state_names
 from .motion.request import MotionRequest
 from .motion.sensitivities import Sensitivities, derivatives_of, sensitivities, state_rates
 from .motion.simulate import simulate
-from .motion.stops import Stop
-from .motion.validity import Validity
+from .motion.validity import DenseOutput, Validity
 from .one_contact.regularity import ContactRegularity, contact_regularity
 
 __all__ = [

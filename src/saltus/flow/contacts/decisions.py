@@ -167,7 +167,7 @@ def decide_contacts(motion):
         motion.frictions[k, FrictionColumn.REACHED] = 0
     if motion.rested == 1 and not rested:
         all_bits = closed_bits(motion) | ((1 << motion.frictions.shape[0]) - 1) << count
-        record_contact_event(motion, EventCode.RESTING, all_bits, settled)
+        record_contact_event(motion, EventCode.REST, all_bits, settled)
         note_shifts(motion, motion.event_shifts)
     motion.mode = Mode.REST if motion.rested == 1 else Mode.ARC
     motion.side = 1 + (closed_bits(motion) | slide_bits(motion, count))

@@ -1,10 +1,9 @@
 """The flow of a motion with several contacts: smooth steps, impacts, releases, accumulations of impacts, rest.
 
-The compiled parts of `kernel/layout.py`, `kernel/roots.py`, `kernel/steps.py`, `layout.py`, `complementarity.py`,
-`impacts.py` and this file are compiled as one, once for every model. `where`, `state`, `settings`, `env`, `steps` and
-`events` are as in `one_contact/kernel.py`; the last numbers in the parameters of `env` say for each coordinate whether it is
-free (1) or held (0). `contacts` has a row for each contact in the columns of `ContactColumn`, `model` holds the functions of
-the structure in the places of `ContactPart`, and `solver` the arrays of `Solver`.
+The compiled parts of the files that `kernel/compiled.py` names, of this file and of `kernel/loop.py`, which calls it, are
+compiled as one module, once for every model. All of a motion's memory is in `motion` (see `kernel/memory.py`):
+`motion.contacts` has a row for each contact, in the columns of `ContactColumn`, and the last of `motion.parameters` say for
+each coordinate whether it is free (1) or held (0).
 
 In a smooth step the closed contacts hold their coordinates, and the model's series are those of the constrained motion. Each
 contact has a guard: the gap if it is open, the reaction if it is closed. If a gap reaches 0, the impact law acts. After this, and

@@ -11,15 +11,14 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from saltus.flow.contacts import choice, closings, complementarity, decisions, extremes, frictions, solver_memory, tangent
+from saltus.flow.contacts import choice, closings, complementarity, decisions, frictions, solver_memory, tangent
 from saltus.flow.contacts import impacts as contact_impacts
 from saltus.flow.contacts import kernel as contacts_kernel
 from saltus.flow.contacts import layout as contact_layout
-from saltus.flow.contacts import segments as contact_segments
 from saltus.flow.contacts.one_free import OneFree, equations_of_one_free
 from saltus.flow.kernel import event_derivatives, function_types, layout, loop, memory, roots, steps
 from saltus.flow.kernel.memory import ContactsFunctions, OneContactFunctions
-from saltus.flow.one_contact import chatter, impacts, kernel, segments, sides
+from saltus.flow.one_contact import impacts, kernel
 from saltus.taylor import (
     SCALAR,
     Case,
@@ -133,7 +132,7 @@ def load_kernel() -> Callable[..., int]:
 
 def kernel_module() -> ModuleType:
     """The module of the scalar kernel."""
-    return load_module("kernel", _text(layout, roots, steps, impacts, chatter, kernel, loop))
+    return load_module("kernel", kernel_text(layout, roots, steps, impacts, kernel, loop))
 
 
 @cache
@@ -154,26 +153,11 @@ def contacts_module() -> ModuleType:
         choice,
         closings,
     )
-    text = _text(layout, roots, steps, *parts, decisions, contacts_kernel, loop)
+    text = kernel_text(layout, roots, steps, *parts, decisions, contacts_kernel, loop)
     return load_module("contacts", text.replace("(ADVANCE)", "(ADVANCE_CONTACTS)"))
 
 
-@cache
-def load_segments() -> tuple[Callable[..., int], Callable[..., None]]:
-    """The functions with which periodic orbits are solved: `follow_segments` and `impact_equations` of
-    `one_contact/segments.py`."""
-    module = load_module("segments", _text(layout, roots, steps, impacts, sides, chatter, segments))
-    return entry_point(module.follow_segments), entry_point(module.impact_equations)
-
-
-@cache
-def load_contact_segments() -> Callable[..., int]:
-    """The function with which orbits with several contacts are solved, `follow_contact_segments` of `contacts/segments.py`."""
-    parts = (contact_layout, solver_memory, complementarity, contact_impacts, tangent, extremes, contact_segments)
-    return entry_point(load_module("contact_segments", _text(layout, roots, steps, *parts)).follow_contact_segments)
-
-
-def _text(*modules: ModuleType) -> str:
+def kernel_text(*modules: ModuleType) -> str:
     """One source of the compiled parts of several files."""
     return _SIGNATURES + "".join(compiled_part(module) for module in modules)
 

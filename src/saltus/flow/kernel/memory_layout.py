@@ -13,9 +13,9 @@ class EventCode(IntEnum):
 
     IMPACT = 0
     GRAZING = 1
-    RESTING = 2
+    REST = 2
     RELEASE = 3
-    CHATTERING = 4
+    CHATTER = 4
     LIMIT = 5
     HELD = 6
     STICK = 7

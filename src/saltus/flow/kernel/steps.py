@@ -137,7 +137,7 @@ def move(motion, tau):
 def record_event(motion, kind, detail, t, before, after):
     """Append an event: (period, kind, side, detail) and (local time, velocity before, velocity after, shifts)."""
     labels, values = motion.event_labels, motion.event_values
-    i, side = motion.recorded_events, 0 if kind == EventCode.RESTING else motion.side
+    i, side = motion.recorded_events, 0 if kind == EventCode.REST else motion.side
     labels[i, 0], labels[i, 1], labels[i, 2], labels[i, 3] = motion.period, kind, side, detail
     values[i, 0], values[i, 1], values[i, 2] = t, before, after
     for j in range(motion.columns):

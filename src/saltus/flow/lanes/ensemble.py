@@ -19,7 +19,7 @@ from saltus.flow.lanes.inputs import Inputs, read_inputs
 from saltus.flow.lanes.memory import JOB
 from saltus.flow.lanes.options import EnsembleOptions, Sample, Until, read_last, read_names, read_side, read_threads
 from saltus.flow.lanes.threads import Jobs, Lanes
-from saltus.flow.motion.forcing_time import Clock, clock
+from saltus.flow.motion.request import Clock, clock
 from saltus.progress import Progress, silent
 from saltus.public_functions import Numbers
 from saltus.systems import System, check_system, numbers

@@ -9,8 +9,8 @@ import numpy as np
 from saltus.checks import check_dataset
 from saltus.flow.kernel.layout import Status
 from saltus.flow.lanes.options import Sample, Until
-from saltus.flow.motion.dataset import rate_name, state_names
-from saltus.flow.motion.stops import Stop
+from saltus.flow.motion.events import Stop
+from saltus.flow.motion.motion import rate_name, state_names
 from saltus.flow.motion.validity import GAIN_ROUNDING
 from saltus.provenance import provenance
 from saltus.public_functions import answered

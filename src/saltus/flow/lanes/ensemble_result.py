@@ -11,7 +11,7 @@ from saltus.flow.kernel.layout import Mode, Status
 from saltus.flow.lanes.inputs import Inputs
 from saltus.flow.lanes.options import EnsembleOptions, Sample
 from saltus.flow.lanes.threads import Ends, Jobs
-from saltus.flow.motion.stops import Stop
+from saltus.flow.motion.events import Stop
 from saltus.systems import System
 from saltus.taylor import FREQUENCY
 

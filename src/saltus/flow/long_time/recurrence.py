@@ -19,8 +19,8 @@ from saltus.flow.lanes.ensemble_result import EnsembleResult
 from saltus.flow.lanes.inputs import read_inputs
 from saltus.flow.lanes.options import EnsembleOptions, Sample, Until, read_threads
 from saltus.flow.long_time.load_release import load_releases
-from saltus.flow.motion.dataset import state_names
-from saltus.flow.motion.stops import Stop
+from saltus.flow.motion.events import Stop
+from saltus.flow.motion.motion import state_names
 from saltus.progress import Progress, silent
 from saltus.systems import System
 

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self, overload
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from saltus.checks import check_count, instants
 from saltus.errors import ParameterError
-from saltus.flow.contacts.modes import modes_of
-from saltus.flow.motion.dense_output import DenseOutput
-from saltus.flow.motion.stops import Stop
-from saltus.flow.motion.validity import Validity, ValidityCheck
+from saltus.flow.motion.events import EventKind, Impacts, MotionEvents, Stop, modes_of
+from saltus.flow.motion.validity import DenseOutput, Validity, ValidityCheck
 from saltus.notebook import html_table
+from saltus.provenance import provenance
 from saltus.public_functions import Numbers
 from saltus.result import Result, table_of
 from saltus.systems import System
@@ -25,142 +22,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-
-class EventKind(StrEnum):
-    """What happens at an instant of a motion, in the order of the kernel's numbers.
-
-    Examples
-    --------
-    >>> [str(kind) for kind in saltus.EventKind][:2]
-    ['impact', 'grazing']
-    """
-
-    IMPACT = "impact"  #: an impact: the gap closes with a speed
-    GRAZING = "grazing"  #: the gap touches zero without a speed, to within the working precision
-    REST = "rest"  #: the system comes to rest at contact, at once or as the limit of impacts
-    RELEASE = "release"  #: the system leaves contact from rest
-    CHATTER = "chatter"  #: impacts without loss became too small to follow; the phase is lost from here on
-    LIMIT = "limit"  #: a margin reached zero
-    HELD = "held"  #: of several contacts, some come to rest as the limit of impacts
-    STICK = "stick"  #: a friction changes from sliding to sticking
-    SLIP = "slip"  #: a friction changes from sticking to sliding
-    REVERSAL = "reversal"  #: a friction slides the other way without having stuck
-
-
-EVENT_KINDS = tuple(EventKind)  # by the kernel's numbers
-
-
-@dataclass(frozen=True, slots=True)
-class Event:
-    """One event: its time, and the velocities before and after it (equal where nothing jumps).
-
-    Attributes
-    ----------
-    time
-        The dimensionless time.
-    kind
-        What happened.
-    side
-        The side on which the motion was before it.
-    velocity_before
-        The velocity just before it.
-    velocity_after
-        The velocity just after it.
-
-    Examples
-    --------
-    >>> event = saltus.simulate(system, theta=0.3, periods=1).events[0]
-    >>> str(event.kind), event.time > 0
-    ('impact', True)
-    """
-
-    time: float
-    kind: EventKind
-    side: int
-    velocity_before: float
-    velocity_after: float
-
-
-@dataclass(frozen=True)
-class Impacts:
-    """The impacts of a motion, as arrays of one length.
-
-    Attributes
-    ----------
-    time
-        The dimensionless times, (n,).
-    side
-        The sides before the impacts, (n,).
-    velocity_before
-        The velocities just before the impacts, (n,).
-    velocity_after
-        The velocities just after the impacts, (n,).
-
-    Examples
-    --------
-    >>> impacts = saltus.simulate(system, theta=0.3, periods=2).impacts
-    >>> bool(np.all(np.diff(impacts.time) > 0)), len(impacts) == len(impacts.velocity_before)
-    (True, True)
-    """
-
-    time: np.ndarray
-    side: np.ndarray
-    velocity_before: np.ndarray
-    velocity_after: np.ndarray
-
-    def __len__(self) -> int:
-        return self.time.size
-
-
-class MotionEvents(Sequence[Event]):
-    """The events of a motion in order of time, made one by one from the kernel's arrays."""
-
-    def __init__(self, times: np.ndarray, labels: np.ndarray, values: np.ndarray) -> None:
-        self.times = times  # (n,)
-        self._labels, self._values = labels, values
-
-    def __len__(self) -> int:
-        return int(self.times.size)
-
-    @overload
-    def __getitem__(self, index: int) -> Event: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[Event]: ...
-    def __getitem__(self, index: Any) -> Any:
-        return self._only(index) if isinstance(index, slice) else self._event(index)
-
-    def _only(self, chosen: Any) -> Self:
-        return type(self)(self.times[chosen], self._labels[chosen], self._values[chosen])
-
-    def _event(self, index: int) -> Any:
-        kind, side = self._labels[index, 1:3]
-        before, after = self._values[index, 1:].tolist()
-        return Event(float(self.times[index]), EVENT_KINDS[kind], int(side), before, after)
-
-    def __repr__(self) -> str:
-        counts = {kind.value: int(np.sum(self._labels[:, 1] == i)) for i, kind in enumerate(EVENT_KINDS)}
-        return f"MotionEvents({', '.join(f'{n} {kind}' for kind, n in counts.items() if n)})"
-
-    def of(self, kind: EventKind) -> Self:
-        """The events of one kind."""
-        return self._only(self._labels[:, 1] == EVENT_KINDS.index(kind))
-
-    @property
-    def codes(self) -> np.ndarray:
-        """(n, 2): the number of each kind in the order of `EventKind`, and the side, or the contacts and frictions as bits."""
-        return self._labels[:, 1:3]
-
-    @property
-    def details(self) -> np.ndarray:
-        """The detail that the kernel recorded with each event, see `kernel/memory_layout.py`; for a limit the number of the
-        margin."""
-        return self._labels[:, 3]
-
-    def impacts(self) -> Impacts:
-        """The impacts, as arrays."""
-        impacts = self.of(EventKind.IMPACT)
-        labels, values = impacts._labels, impacts._values
-        return Impacts(impacts.times, labels[:, 2].astype(np.int8), values[:, 1], values[:, 2])
+PERIOD_SAMPLES = 200  # samples in a forcing period if no times are given
 
 
 @dataclass(frozen=True, eq=False)
@@ -399,6 +261,84 @@ class Motion(Result):
         times
             Dimensionless times, (n,).
         """
-        from saltus.flow.motion.dataset import to_dataset
-
         return to_dataset(self, times)
+
+
+# --- as a dataset ----------------------------------------------------------------------------------------------------
+
+
+def to_dataset(motion: Motion, times: Any = None) -> xarray.Dataset:
+    """The sampled states over `time` and the impacts over `impact`; the attributes hold all that is needed to repeat the
+    motion."""
+    import xarray
+
+    period = motion.system.load.period
+    if times is None and motion.kept is not None:
+        times, position, velocity, side = (getattr(motion.kept, n) for n in ("time", "position", "velocity", "side"))
+    else:
+        times = _default_times(motion, period) if times is None else instants(times)
+        position, velocity, side = motion._states(times)
+    names = motion.system.model.coordinates
+    dataset = xarray.Dataset(coords={"time": ("time", times, {"units": "1", "long_name": "dimensionless time tau"})})
+    for i, name in enumerate(names):
+        unit = motion.system.model.unit_of(name)
+        dataset[name] = ("time", position[i], {"units": unit})
+        dataset[rate_name(name, names)] = ("time", velocity[i], {"units": unit, "long_name": f"d {name} / d tau"})
+    if motion.system.model.holds_coordinates:
+        _add_contacts(motion, dataset, side)
+    else:
+        dataset["side"] = ("time", side.astype(np.int8), {"units": "1", "long_name": "side, 0 at rest"})
+        for name in ("time", "velocity_before", "velocity_after"):
+            unit = "1" if name == "time" else motion.system.model.unit_of(names[0])
+            dataset[f"impact_{name}"] = ("impact", getattr(motion.impacts, name), {"units": unit})
+    dataset.attrs = {"title": "motion computed by saltus", "kind": "motion"} | provenance(motion.system, tol=motion.tol)
+    dataset.attrs |= {
+        "stop": motion.stop.value + (f" ({motion.limit})" if motion.limit else ""),
+        "end_time": motion.time,
+        "phase_known": str(motion.phase_known),
+        "validity": str(motion.validity) if motion.dense or motion.sampled_validity else "not kept",
+        "Conventions": "CF-1.8",
+    }
+    if motion.rest_time is not None:
+        dataset.attrs["rest_time"] = motion.rest_time
+    return dataset
+
+
+def _add_contacts(motion: Motion, dataset: xarray.Dataset, side: np.ndarray) -> None:
+    """Add the closed contacts, the directions of frictions, and the impacts: times, contacts, positions and velocities."""
+    model, impacts = motion.system.model, motion.impacts
+    names, contacts = model.coordinates, [contact.name for contact in model.contacts]
+    masks = np.array([1 << i for i in range(len(contacts))], dtype=np.int16)
+    flags = {"units": "1", "flag_masks": masks, "flag_meanings": " ".join(contacts)}
+    closed, slides = modes_of(model, side)
+    for friction, direction in zip(model.frictions, slides, strict=True):
+        text = f"direction in which {friction.name} slides, 0 where it sticks"
+        dataset[f"sliding_{friction.name}"] = ("time", direction.astype(np.int8), {"units": "1", "long_name": text})
+    if not contacts:
+        return
+    dataset["closed_contacts"] = ("time", closed.astype(np.int16), flags | {"long_name": "contacts that are closed"})
+    dataset["impact_time"] = ("impact", impacts.time, {"units": "1"})
+    dataset["impact_contacts"] = ("impact", impacts.side, flags | {"long_name": "contacts that were hit"})
+    position = np.full((len(names), len(impacts)), np.nan)
+    if motion.dense is not None and len(impacts):
+        position = motion._states(impacts.time)[0]
+    for i, name in enumerate(names):
+        unit = {"units": model.unit_of(name)}
+        dataset[f"impact_{name}"] = ("impact", position[i], unit)
+        for when, velocity in (("before", impacts.velocity_before), ("after", impacts.velocity_after)):
+            dataset[f"impact_{rate_name(name, names)}_{when}"] = ("impact", velocity[:, i], unit)
+
+
+def rate_name(name: str, names: tuple[str, ...]) -> str:
+    """The name of the velocity of a coordinate."""
+    return "velocity" if len(names) == 1 else f"{name}_velocity"
+
+
+def _default_times(motion: Motion, period: float | None) -> np.ndarray:
+    count = 10 * PERIOD_SAMPLES if period is None else int(np.ceil(PERIOD_SAMPLES * (motion.time - motion.start) / period))
+    return np.linspace(motion.start, motion.time, max(2, count + 1))
+
+
+def state_names(names: tuple[str, ...]) -> tuple[str, ...]:
+    """The names of the state variables, coordinates and then velocities, of a model with these coordinates."""
+    return *names, *(rate_name(name, names) for name in names)

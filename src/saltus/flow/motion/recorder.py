@@ -9,13 +9,12 @@ import numpy as np
 
 from saltus.checks import LIMITS, free_memory
 from saltus.errors import MotionError
-from saltus.flow.contacts.events import ContactEvents
 from saltus.flow.kernel.memory import EventBuffers, StepBuffers
 from saltus.flow.kernel.memory_layout import EventCode
-from saltus.flow.motion.dense_output import DenseOutput
-from saltus.flow.motion.motion import MotionEvents, Samples
+from saltus.flow.motion.events import ContactEvents, MotionEvents
+from saltus.flow.motion.motion import Samples
 from saltus.flow.motion.request import MotionRequest
-from saltus.flow.motion.validity import Validity, ValidityCheck
+from saltus.flow.motion.validity import DenseOutput, Validity, ValidityCheck
 
 
 @dataclass(frozen=True)

@@ -14,11 +14,10 @@ from saltus.flow.contacts.layout import ImpactDetail
 from saltus.flow.kernel.layout import GrazingDetail
 from saltus.flow.kernel.memory_layout import RestDetail
 from saltus.flow.kernel.structures import Program
-from saltus.flow.motion.dataset import state_names
-from saltus.flow.motion.motion import EventKind, Motion
+from saltus.flow.motion.events import EventKind, Stop
+from saltus.flow.motion.motion import Motion, state_names
 from saltus.flow.motion.request import MotionRequest
 from saltus.flow.motion.simulate import Followed, follow
-from saltus.flow.motion.stops import Stop
 from saltus.progress import Progress, silent
 from saltus.public_functions import Numbers
 from saltus.result import Result, result_dataset

@@ -11,10 +11,10 @@ from saltus.errors import MotionError
 from saltus.flow.contacts.state import ContactState
 from saltus.flow.kernel.layout import Mode, Status
 from saltus.flow.kernel.structures import Program, program
+from saltus.flow.motion.events import Stop
 from saltus.flow.motion.motion import Motion
 from saltus.flow.motion.recorder import MOST, Recorder
 from saltus.flow.motion.request import MotionRequest
-from saltus.flow.motion.stops import Stop
 from saltus.flow.one_contact.state import KernelState
 from saltus.progress import Progress, silent
 from saltus.public_functions import Numbers

@@ -1,4 +1,4 @@
-"""Validity of a motion: whether the real mechanism stays within its limits (errata 19, 20) and its assumptions (errata 21)."""
+"""Dense output, the Taylor series of every step, and the validity of a motion, by the margins along it."""
 
 from __future__ import annotations
 
@@ -7,12 +7,46 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow.motion.dense_output import DenseOutput, evaluate
 from saltus.systems import System, energy_gain
 
 STEP_SAMPLES = 12  # samples in each step to find changes of sign; a step is shorter than the time scale of a margin
 GAIN_ROUNDING = 1e-12  # A smaller share by which an impact raises the energy is rounding.
 RIDDERS_ITERATIONS = 8  # of Ridders' method, each of which doubles the correct digits or at least halves the bracket
+
+
+@dataclass(frozen=True, eq=False)
+class DenseOutput:
+    """The steps of a motion: step i starts at `start[i]` on `side[i]` (0: at rest) and holds the coordinates' Taylor series.
+
+    `series` has shape (steps, degrees of freedom, order + 2), in powers of the time since the step's start.
+    """
+
+    start: np.ndarray
+    length: np.ndarray
+    side: np.ndarray
+    series: np.ndarray
+
+    @property
+    def end(self) -> float:
+        """When the last step ends."""
+        return float(self.start[-1] + self.length[-1])
+
+    def states(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Coordinates and velocities, each (degrees of freedom, n), and sides (n,); at an impact, those after it."""
+        step = np.clip(np.searchsorted(self.start, times, side="right") - 1, 0, None)
+        tau = times - self.start[step]
+        powers = np.arange(self.series.shape[2])
+        coefficients = self.series[step]
+        slopes = coefficients[:, :, 1:] * powers[1:]
+        return evaluate(coefficients, tau), evaluate(slopes, tau), self.side[step]
+
+
+def evaluate(coefficients: np.ndarray, tau: np.ndarray) -> np.ndarray:
+    """Horner's scheme for many series at once: (n, dof, order) at (n,) gives (dof, n)."""
+    value = coefficients[:, :, -1]
+    for k in range(coefficients.shape[2] - 2, -1, -1):
+        value = value * tau[:, None] + coefficients[:, :, k]
+    return value.T
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,27 @@
-"""The events at the contact: impacts, rest and release, and the ends of accumulations of impacts.
+"""The events at the contact: impacts, rest and release, the ends of accumulations of impacts, and chatter.
 
-Its compiled part goes into one module with that of `kernel.py`, whose docstring defines `env`, `model` and `work`.
+Its compiled part goes into one module with that of `kernel.py`.
 """
 
 from __future__ import annotations
 
 import math
 
-from saltus.flow.kernel.layout import CHATTER_SPEED, LOSSLESS, SLOW, SLOWLY, TINY, Geometry, GrazingDetail, Mode, Status
+from saltus.flow.kernel.layout import (
+    CHATTER_SPEED,
+    GAUSS_NODES,
+    GAUSS_WEIGHTS,
+    LOSSLESS,
+    SLOW,
+    SLOWLY,
+    TINY,
+    Geometry,
+    GrazingDetail,
+    Mode,
+    Status,
+)
 from saltus.flow.kernel.memory_layout import EventCode, ReleaseDetail, RestDetail
-from saltus.flow.kernel.roots import leading
+from saltus.flow.kernel.roots import horner, leading
 from saltus.flow.kernel.steps import columns_at_event, forget, motion_end, record_event, record_shift, record_step
 from saltus.taylor import lean_jit
 
@@ -124,7 +136,7 @@ def rest_columns(motion, t, tol):
     """
     mode, _ = accumulation(motion, TINY, t, tol)
     detail = RestDetail.AT_ONCE if mode == Mode.REST else RestDetail.NEVER_AGAIN
-    columns_at_event(motion, EventCode.RESTING, detail, t, float(motion.side))
+    columns_at_event(motion, EventCode.REST, detail, t, float(motion.side))
     motion.event_labels[motion.recorded_events - 1, 3] = detail
     record_shift(motion)
 
@@ -151,7 +163,7 @@ def decide_at_rest(motion):
     if not leave_or_stay(motion):
         return Status.NOT_UNIQUE
     if motion.mode == Mode.REST and motion.rested == 0:
-        record_event(motion, EventCode.RESTING, 0, t, 0.0, 0.0)
+        record_event(motion, EventCode.REST, 0, t, 0.0, 0.0)
         if motion.columns > 0:
             rest_columns(motion, t, motion.tolerance)
     if motion.mode == Mode.ARC and motion.rested != 0:
@@ -167,9 +179,9 @@ def decide_at_rest(motion):
 def end_accumulation(motion, left, t_end):
     """Come to rest after the time `left`, within which all further impacts of the accumulation take place."""
     t = motion.time
-    record_event(motion, EventCode.RESTING, 0, t + left, 0.0, 0.0)
+    record_event(motion, EventCode.REST, 0, t + left, 0.0, 0.0)
     if motion.columns > 0:
-        columns_at_event(motion, EventCode.RESTING, RestDetail.AFTER_IMPACTS, t, float(motion.side))
+        columns_at_event(motion, EventCode.REST, RestDetail.AFTER_IMPACTS, t, float(motion.side))
         record_shift(motion)
     hold(motion)
     motion.time = min(t + left, t_end)
@@ -191,7 +203,7 @@ def decide(motion, t_end):
         if mode == Mode.REST:
             end_accumulation(motion, left, t_end)
         if mode == Mode.CHATTER:
-            record_event(motion, EventCode.CHATTERING, 0, t, velocity, velocity)
+            record_event(motion, EventCode.CHATTER, 0, t, velocity, velocity)
             forget(motion)
             hold(motion)
             motion.chatter_speed, motion.skip = speed, 0
@@ -221,3 +233,41 @@ def impact(motion, t, before):
     motion.side = int(next_side)
     set_state(motion, contact, after)
     return Status.PAUSED
+
+
+# --- chatter: the averaged law of impacts that lose nothing ------------------------------------------------------------
+#
+# The speeds v_s on the sides s are proportional to one speed v. The action v^2 sum v_s / abs(a_s) decays with the mean damping
+# over a cycle, sum g_s v_s / abs(a_s) / sum v_s / abs(a_s), under any load that presses both contacts. The phase is lost.
+
+
+@lean_jit
+def chatter_sums(motion, h, x, factor, t):
+    """The sums over the sides of g v / abs(a) and v / abs(a), with the damping g, for unit speed, at the share x of a step."""
+    b, order = motion.pull_series, motion.order
+    damping, duration = 0.0, 0.0
+    for i in range(motion.sides):
+        side = 1.0 - 2.0 * i
+        pull = abs(horner(b[i], order, x * h))
+        share = (1.0 if side == motion.side else factor) / pull
+        damping += share * motion.contact_damping(t + x * h, motion.origin, side, motion.env, motion.piece)
+        duration += share
+    return damping, duration
+
+
+@lean_jit
+def chatter_decay(motion, h):
+    """Advance the chatter speed over a step: the action, v^2 times the duration sum v_s/abs(a_s), decays as the mean damping."""
+    t, side = motion.time, float(motion.side)
+    contact_accelerations(motion, t)
+    next_side, after = motion.reset(
+        t, motion.origin, -motion.chatter_speed / rate_of(motion, side), side, motion.env, motion.piece
+    )
+    factor = rate_of(motion, next_side) * after / motion.chatter_speed
+    decay = 0.0
+    for j in range(GAUSS_NODES.size):
+        damping, duration = chatter_sums(motion, h, GAUSS_NODES[j], factor, t)
+        decay += GAUSS_WEIGHTS[j] * h * damping / duration
+    _, before = chatter_sums(motion, h, 0.0, factor, t)
+    _, after_step = chatter_sums(motion, h, 1.0, factor, t)
+    motion.chatter_speed *= (math.exp(-decay) * before / after_step) ** (1.0 / 3.0)

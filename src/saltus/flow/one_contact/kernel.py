@@ -1,17 +1,14 @@
 """The scalar flow of one motion: arcs, impacts, rest and release, accumulations of impacts, chatter.
 
-The compiled parts of `kernel/layout.py`, `kernel/roots.py`, `kernel/steps.py`, `impacts.py`, `chatter.py` and this file are
-compiled as one module, once for all models: the functions that are generated for a structure (see `kernel/compiled.py`) are
-arguments. These files therefore consist of plain loops under the decorators of `saltus.taylor`, and share one namespace.
+The compiled parts of `kernel/layout.py`, `kernel/roots.py`, `kernel/steps.py`, `impacts.py`, this file and `kernel/loop.py`,
+which calls it, are compiled as one module, once for all models: the functions that are generated for a structure (see
+`kernel/compiled.py`) are in its memory. These files therefore consist of plain loops under the decorators of `saltus.taylor`, and
+share one namespace. All of a motion's memory is in `motion` (see `kernel/memory.py`).
 
 A motion is in one of the modes of `Mode`. If a tangent is asked for (see `kernel/event_derivatives.py`), its columns are further
 coordinates, which `series` expands with the others. The steps are chosen by the motion itself, so that its impacts are the same
 to the last bit with and without tangent, except where a column needs shorter steps. At an event the structure's function
 `tangent` computes the new columns and the shift of the event, which are nan where there is no derivative.
-
-`where`, `state` and `settings` are arrays in the places of `Where`, `State` and `Setting`; `env` = (parameters, constants, record
-breakpoints, record table); `model` holds the functions of the structure in the places of `ModelPart`, and `work` the arrays of a
-step in those of `Work`.
 """
 
 from __future__ import annotations
@@ -34,8 +31,7 @@ from saltus.flow.kernel.steps import (
     step_arrays,
     step_size,
 )
-from saltus.flow.one_contact.chatter import chatter_decay
-from saltus.flow.one_contact.impacts import contact_accelerations, decide, hold, impact, rate_of
+from saltus.flow.one_contact.impacts import chatter_decay, contact_accelerations, decide, hold, impact, rate_of
 from saltus.taylor import jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------

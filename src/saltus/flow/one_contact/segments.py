@@ -2,7 +2,7 @@
 
 A segment is the smooth motion on one side from one instant to another, whatever the sign of the gap, forwards or backwards in
 time; it starts with an impact or from a state. If passing the contact is no singularity (`ContactRegularity.CONTINUOUS`), it is
-the motion from a state through all sides. The compiled parts of the kernel's files (see `kernel.py`) up to `chatter.py` and of
+the motion from a state through all sides. The compiled parts of the kernel's files (see `kernel.py`) up to `impacts.py` and of
 this file are compiled as one module, once for all models. Time is not counted by forcing periods here; loads with records, which
 are not periodic, have no orbits.
 """

@@ -16,7 +16,7 @@ from saltus.systems import Model
 
 CHANGES = (
     EventCode.IMPACT,
-    EventCode.RESTING,
+    EventCode.REST,
     EventCode.RELEASE,
     EventCode.HELD,
     EventCode.STICK,
@@ -157,7 +157,7 @@ def _listed(motion: Motion) -> tuple[list[OrbitEvent], np.ndarray, np.ndarray]:
     speeds[codes[:, 0] == EventCode.IMPACT] = impact_speeds(motion)
     # a rest is recorded besides the event that brings it, and at the start of a motion: it counts only if it stands alone
     alone = (np.searchsorted(times, times, side="right") - np.searchsorted(times, times) == 1) & (times > motion.start)
-    chosen = np.isin(codes[:, 0], CHANGES) & (alone | (codes[:, 0] != EventCode.RESTING))
+    chosen = np.isin(codes[:, 0], CHANGES) & (alone | (codes[:, 0] != EventCode.REST))
     kept = np.flatnonzero(chosen)
     for parts, _ in _groups(motion):
         own = kept[codes[kept, 1] & parts != 0]
@@ -198,7 +198,7 @@ def _dying(codes: np.ndarray, speeds: np.ndarray) -> np.ndarray:
     The accumulation begins after the last impact that is slower than its successor.
     """
     dying = np.zeros(len(codes), dtype=bool)
-    for last in np.flatnonzero(np.isin(codes[:, 0], (EventCode.HELD, EventCode.RESTING))):
+    for last in np.flatnonzero(np.isin(codes[:, 0], (EventCode.HELD, EventCode.REST))):
         others = (codes[:last, 0] != EventCode.IMPACT) | (codes[:last, 1] & ~codes[last, 1] != 0)
         first = 1 + int(np.flatnonzero(others)[-1]) if others.any() else 0
         run = speeds[first:last]

@@ -1,0 +1,229 @@
+"""The events of a motion, what they say of the contacts, and why motions end: the one place in Python that knows all kinds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, Self, overload
+
+import numpy as np
+
+from saltus.systems import Model
+
+
+class EventKind(StrEnum):
+    """What happens at an instant of a motion, in the order of the kernel's numbers.
+
+    Examples
+    --------
+    >>> [str(kind) for kind in saltus.EventKind][:2]
+    ['impact', 'grazing']
+    """
+
+    IMPACT = "impact"  #: an impact: the gap closes with a speed
+    GRAZING = "grazing"  #: the gap touches zero without a speed, to within the working precision
+    REST = "rest"  #: the system comes to rest at contact, at once or as the limit of impacts
+    RELEASE = "release"  #: the system leaves contact from rest
+    CHATTER = "chatter"  #: impacts without loss became too small to follow; the phase is lost from here on
+    LIMIT = "limit"  #: a margin reached zero
+    HELD = "held"  #: of several contacts, some come to rest as the limit of impacts
+    STICK = "stick"  #: a friction changes from sliding to sticking
+    SLIP = "slip"  #: a friction changes from sticking to sliding
+    REVERSAL = "reversal"  #: a friction slides the other way without having stuck
+
+
+EVENT_KINDS = tuple(EventKind)  # by the kernel's numbers
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """One event: its time, and the velocities before and after it (equal where nothing jumps).
+
+    Attributes
+    ----------
+    time
+        The dimensionless time.
+    kind
+        What happened.
+    side
+        The side on which the motion was before it.
+    velocity_before
+        The velocity just before it.
+    velocity_after
+        The velocity just after it.
+
+    Examples
+    --------
+    >>> event = saltus.simulate(system, theta=0.3, periods=1).events[0]
+    >>> str(event.kind), event.time > 0
+    ('impact', True)
+    """
+
+    time: float
+    kind: EventKind
+    side: int
+    velocity_before: float
+    velocity_after: float
+
+
+@dataclass(frozen=True)
+class Impacts:
+    """The impacts of a motion, as arrays of one length.
+
+    Attributes
+    ----------
+    time
+        The dimensionless times, (n,).
+    side
+        The sides before the impacts, (n,).
+    velocity_before
+        The velocities just before the impacts, (n,).
+    velocity_after
+        The velocities just after the impacts, (n,).
+
+    Examples
+    --------
+    >>> impacts = saltus.simulate(system, theta=0.3, periods=2).impacts
+    >>> bool(np.all(np.diff(impacts.time) > 0)), len(impacts) == len(impacts.velocity_before)
+    (True, True)
+    """
+
+    time: np.ndarray
+    side: np.ndarray
+    velocity_before: np.ndarray
+    velocity_after: np.ndarray
+
+    def __len__(self) -> int:
+        return self.time.size
+
+
+class MotionEvents(Sequence[Event]):
+    """The events of a motion in order of time, made one by one from the kernel's arrays."""
+
+    def __init__(self, times: np.ndarray, labels: np.ndarray, values: np.ndarray) -> None:
+        self.times = times  # (n,)
+        self._labels, self._values = labels, values
+
+    def __len__(self) -> int:
+        return int(self.times.size)
+
+    @overload
+    def __getitem__(self, index: int) -> Event: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Event]: ...
+    def __getitem__(self, index: Any) -> Any:
+        return self._only(index) if isinstance(index, slice) else self._event(index)
+
+    def _only(self, chosen: Any) -> Self:
+        return type(self)(self.times[chosen], self._labels[chosen], self._values[chosen])
+
+    def _event(self, index: int) -> Any:
+        kind, side = self._labels[index, 1:3]
+        before, after = self._values[index, 1:].tolist()
+        return Event(float(self.times[index]), EVENT_KINDS[kind], int(side), before, after)
+
+    def __repr__(self) -> str:
+        counts = {kind.value: int(np.sum(self._labels[:, 1] == i)) for i, kind in enumerate(EVENT_KINDS)}
+        return f"MotionEvents({', '.join(f'{n} {kind}' for kind, n in counts.items() if n)})"
+
+    def of(self, kind: EventKind) -> Self:
+        """The events of one kind."""
+        return self._only(self._labels[:, 1] == EVENT_KINDS.index(kind))
+
+    @property
+    def codes(self) -> np.ndarray:
+        """(n, 2): the number of each kind in the order of `EventKind`, and the side, or the contacts and frictions as bits."""
+        return self._labels[:, 1:3]
+
+    @property
+    def details(self) -> np.ndarray:
+        """The detail that the kernel recorded with each event, see `kernel/memory_layout.py`; for a limit the number of the
+        margin."""
+        return self._labels[:, 3]
+
+    def impacts(self) -> Impacts:
+        """The impacts, as arrays."""
+        impacts = self.of(EventKind.IMPACT)
+        labels, values = impacts._labels, impacts._values
+        return Impacts(impacts.times, labels[:, 2].astype(np.int8), values[:, 1], values[:, 2])
+
+
+@dataclass(frozen=True, slots=True)
+class ContactEvent:
+    """One event: its time, its contacts or frictions, the velocities of all coordinates before and after it, and all impulses."""
+
+    time: float
+    kind: EventKind
+    contact: str  # the name of the contact or friction, or several with "+" between them; "both" for two of two contacts
+    velocity_before: tuple[float, ...]
+    velocity_after: tuple[float, ...]
+    impulse: tuple[float, ...]  # of each contact, along its sign
+
+
+class ContactEvents(MotionEvents):
+    """The events of a motion with several contacts or frictions, in order of time."""
+
+    def __init__(
+        self, times: np.ndarray, labels: np.ndarray, values: np.ndarray, contacts: Sequence[str], frictions: Sequence[str]
+    ) -> None:
+        super().__init__(times, labels, values)
+        self._contacts, self._frictions, self._own = contacts, frictions, (values.shape[1] - 1 - len(contacts)) // 2
+
+    def _only(self, chosen: Any) -> ContactEvents:
+        return ContactEvents(self.times[chosen], self._labels[chosen], self._values[chosen], self._contacts, self._frictions)
+
+    def _event(self, index: int) -> ContactEvent:
+        kind, bits = (int(x) for x in self._labels[index, 1:3])
+        before, after, impulse = (tuple(x.tolist()) for x in self._parts(index))
+        return ContactEvent(float(self.times[index]), EVENT_KINDS[kind], self._called(bits), before, after, impulse)
+
+    def _parts(self, index: Any) -> list[np.ndarray]:
+        return np.split(self._values[index, 1:], [self._own, 2 * self._own], axis=-1)
+
+    def _called(self, bits: int) -> str:
+        chosen = [name for i, name in enumerate((*self._contacts, *self._frictions)) if bits >> i & 1]
+        return "both" if chosen == list(self._contacts) and len(chosen) == 2 else "+".join(chosen)
+
+    def impacts(self) -> Impacts:
+        """The impacts, as arrays; `side` has the bits of the contacts that were hit, velocities are (n, coordinates)."""
+        impacts = self.of(EventKind.IMPACT)
+        before, after, _ = impacts._parts(slice(None))
+        return Impacts(impacts.times, impacts._labels[:, 2].astype(np.int16), before, after)
+
+
+def modes_of(model: Model, side: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Closed contacts as bits, and the direction in which each friction slides, from the numbers `side` of motions."""
+    count, number = len(model.contacts), np.asarray(side).astype(np.int64) - 1
+    slides = [(number >> (count + 2 * k) & 3) - 1 for k in range(len(model.frictions))]
+    return number & ((1 << count) - 1), slides
+
+
+class Stop(StrEnum):
+    """Why a motion ended: a word, and its `meaning` in a sentence.
+
+    Examples
+    --------
+    >>> str(saltus.simulate(system, theta=0.3, periods=2).stop)
+    'horizon'
+    """
+
+    meaning: str
+
+    def __new__(cls, word: str, meaning: str) -> Stop:
+        member = str.__new__(cls, word)
+        member._value_, member.meaning = word, meaning
+        return member
+
+    HORIZON = "horizon", "the time asked for"
+    REST = "rest", "the time asked for, at rest"
+    LIMIT = "limit", "a margin of the model reached zero"
+    CAPTURED = "captured", "proved to be captured at rest for all later loads"
+    SETTLED = "settled", "repeats itself every `recurrence_period` forcing periods"
+    NOT_UNIQUE = "not_unique", "the motion from rest at contact is not unique"
+    NO_IMPACT = "no_impact", "the impact law has no velocity after the impact"
+    NOT_FINITE = "not_finite", "the motion leaves the range of numbers"
+    STALLED = "stalled", "the acceleration is singular"
+    SINGULAR = "singular", "the mass matrix has no inverse"
+    OUTSIDE = "outside", "the state at the start lies beyond the contact"
+    UNRESOLVED = "unresolved", "impacts accumulate too slowly to be followed: more than a million in a unit of time"
