@@ -1,15 +1,13 @@
-from .contacts.layout import ContactColumn, SegmentEnd, SegmentExtremes, SegmentPlan
+from .contacts.layout import SegmentEnd, SegmentExtremes, SegmentPlan
 from .kernel.layout import SegmentColumn, SegmentValue
 from .kernel.memory_layout import EventCode
 from .kernel.orbit_segments import SegmentFollower, load_segments
-from .kernel.structures import Program, limits_of, program, taylor_order
+from .kernel.structures import Program, limits_of, program
 from .lanes.capture_speeds import captured_between
-from .lanes.compiled_lanes import load_advance, load_driver, load_helpers
-from .lanes.ensemble import TangentEnsemble, compiled_lanes, simulate_many
+from .lanes.ensemble import TangentEnsemble, simulate_many
 from .lanes.ensemble_dataset import extrema_names, stop_names, stroboscopic
 from .lanes.inputs import Inputs, read_inputs
-from .lanes.options import EnsembleOptions
-from .lanes.threads import Jobs, Lanes, available_cores, share_cores
+from .lanes.threads import available_cores, share_cores
 from .long_time.approach import approached
 from .long_time.load_release import Release, contact_pull, load_releases, peak_near
 from .long_time.recurrence import (
@@ -35,18 +33,14 @@ from .one_contact.regularity import ContactRegularity, contact_regularity
 
 __all__ = [
     "RECURRENCE",
-    "ContactColumn",
     "ContactRegularity",
     "DenseOutput",
     "Ending",
-    "EnsembleOptions",
     "Event",
     "EventCode",
     "EventKind",
     "Impacts",
     "Inputs",
-    "Jobs",
-    "Lanes",
     "Motion",
     "MotionRequest",
     "Program",
@@ -66,7 +60,6 @@ __all__ = [
     "approached",
     "available_cores",
     "captured_between",
-    "compiled_lanes",
     "contact_pull",
     "contact_regularity",
     "derivatives_of",
@@ -75,9 +68,6 @@ __all__ = [
     "find_recurrence",
     "last_states",
     "limits_of",
-    "load_advance",
-    "load_driver",
-    "load_helpers",
     "load_releases",
     "load_segments",
     "modes_of",
@@ -97,5 +87,4 @@ __all__ = [
     "state_rates",
     "stop_names",
     "stroboscopic",
-    "taylor_order",
 ]
