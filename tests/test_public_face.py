@@ -293,7 +293,7 @@ def test_arguments_that_fit_are_taken(made, alone):
 
 # A study or a store that is nowhere, an empty tree, a fold where only a period doubling begins something.
 REFUSED = ("saltus.branch_of", "saltus.doubling_cascade", "saltus.switch_branch", "saltus.load", "saltus.load_study")
-REFUSED += ("sweep.open_store", "sweep.status")
+REFUSED += ("saltus.branches_of", "sweep.open_store", "sweep.status")
 
 
 @pytest.fixture
