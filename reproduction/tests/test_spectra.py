@@ -18,7 +18,7 @@ QUICK = {
 ERRATA = {"fig09": {21, 22}, "fig10": {21, 22}, "fig11": {21, 24, 30, 36, 37}, "fig12": {21, 36}, "fig13": {21, 35}}
 # How many motions there are, and where chaos begins and ends: not from a quick search at two or three values
 NEED_A_WHOLE_SEARCH = {
-    *("fig09-chaos", "fig09-chaos-range", "fig09-pierced", "fig10-chaos", "fig10-pierced"),
+    *("fig09-chaos", "fig09-chaos-range", "fig09-pierced", "fig10-chaos", "fig10-transients", "fig10-pierced"),
     *("fig11-coexistence", "fig11-route", "fig11-two-regions", "fig11-shift", "fig11-pierced"),
     *("fig12-coexistence", "fig12-shift", "fig13-features"),
 }
