@@ -8,6 +8,7 @@ import runpy
 import statistics
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -253,6 +254,91 @@ def test_files_hold_one_thing() -> None:
 @pytest.mark.parametrize("path", [p for p in FILES if p.name == "__init__.py"], ids=lambda p: str(p.relative_to(SOURCE)))
 def test_every_room_says_what_is_in_it(path: Path) -> None:
     assert len(ast.get_docstring(parsed(path)) or "") > 40
+
+
+# --- what a reader must hold: ceilings that only fall ----------------------------------------------------------------------
+
+CEILINGS = {
+    "files in the import closure of simulate": 87,
+    "files that the architecture page names for a motion": 29,
+    "isinstance of equations": 1,
+    "asking a model of which class it is": 23,
+    "arguments of a compiled function": 11,
+    "public names behind doors": 482,
+    "tuned numbers": 503,
+    "files of the library": 299,
+}
+
+
+def closure(start: str) -> set[str]:
+    """All files that are imported, at once or at first use, by the file `start` and by what it imports."""
+    seen: set[str] = set()
+    waiting = [start]
+    paths = {module_of(path): path for path in FILES}
+    while waiting:
+        module = waiting.pop()
+        if module in seen or module not in paths:
+            continue
+        seen.add(module)
+        parts = module.split(".")
+        waiting += [".".join(parts[:i]) for i in range(1, len(parts))]
+        waiting += [reached for _, _, reached in imported(paths[module])]
+    return seen
+
+
+def named_for_a_motion() -> set[str]:
+    """The files that the walk "A motion" of the architecture page names."""
+    page = (SOURCE.parents[1] / "docs" / "architecture.md").read_text()
+    walk = page.split("## A motion")[1].split("\n## ")[0]
+    return set(re.findall(r"[\w/]+\.py", walk))
+
+
+def asked_of_models() -> Iterator[str]:
+    """What tells the class of a `model`, outside of the rooms that must know it; a signature's `sides` are its own."""
+    for path in FILES:
+        if path.relative_to(SOURCE).parts[0] not in ("systems", "flow"):
+            asked = (
+                n for n in ast.walk(parsed(path)) if isinstance(n, ast.Attribute) and n.attr in ("held", "contacts", "sides")
+            )
+            yield from (n.attr for n in asked if getattr(n.value, "attr", getattr(n.value, "id", "")) == "model")
+
+
+def tuned() -> Iterator[str]:
+    """Numbers at the top of a file, and fields of settings with a value."""
+    for path in FILES:
+        yield from numbers_of(path)
+        for node in ast.walk(parsed(path)):
+            if isinstance(node, ast.ClassDef) and node.name.endswith("Settings"):
+                yield from (str(n.target.id) for n in node.body if isinstance(n, ast.AnnAssign) and n.value)
+
+
+def compiled_arguments() -> Iterator[int]:
+    """The number of arguments of each function that numba compiles, which are those that mypy is told to leave alone."""
+    settings = tomllib.loads((SOURCE.parents[1] / "pyproject.toml").read_text())["tool"]["mypy"]["overrides"]
+    compiled = {name for part in settings if part.get("check_untyped_defs") is False for name in part["module"]}
+    for path in FILES:
+        if module_of(path) in compiled:
+            functions = (n for n in ast.walk(parsed(path)) if isinstance(n, ast.FunctionDef))
+            yield from (len(function.args.args) for function in functions)
+
+
+def measured() -> dict[str, int]:
+    equations = re.compile(r"isinstance\([^)]*(?:Problem|Equations|RestingOrbit)")
+    return {
+        "files in the import closure of simulate": len(closure(behind_the_door("saltus.flow")["simulate"])),
+        "files that the architecture page names for a motion": len(named_for_a_motion()),
+        "isinstance of equations": sum(len(equations.findall(path.read_text())) for path in FILES),
+        "asking a model of which class it is": len(list(asked_of_models())),
+        "arguments of a compiled function": max(compiled_arguments()),
+        "public names behind doors": sum(len(behind_the_door(f"saltus.{room}")) for room in ROOMS),
+        "tuned numbers": len(list(tuned())),
+        "files of the library": len(FILES),
+    }
+
+
+@pytest.mark.parametrize("what", CEILINGS)
+def test_what_a_reader_must_hold_only_falls(what: str) -> None:
+    assert measured()[what] <= CEILINGS[what]
 
 
 # --- weight ----------------------------------------------------------------------------------------------------------------
