@@ -1,178 +1,99 @@
-from . import attractors, flow, orbits, studies, sweep, systems, theory
-from .attractors import (
-    Exponents,
-    Verdict,
-    attractors_along,
-    basins_of_attraction,
-    classify,
-    excludes_tori,
-    find_attractors,
-    lyapunov_many,
-    lyapunov_spectrum,
-    separatrices,
-    stable_manifold,
-    zero_one_test,
-)
-from .bounds import capture_speed
-from .branch_tables import branch_of, branches_of
-from .config import load, load_study, save, to_mat
-from .errors import MotionError, ParameterError, SaltusError, SweepError, TraceError
-from .flow import Ending, EventKind, Motion, Sensitivities, Stop, sensitivities, simulate, simulate_many, stop_names
-from .orbits import (
-    Branch,
-    FreeOrbit,
-    PeriodicOrbit,
-    SpecialCurve,
-    SpecialPoint,
-    backbone,
-    continue_orbit,
-    continue_special,
-    doubling_cascade,
-    find_orbit,
-    free_orbit,
-    mean_dissipated_power,
-    search_orbits,
-    switch_branch,
-    transmissibility,
-)
-from .plots import plot
-from .progress import show_progress
-from .studies import bifurcation_diagram, chaotic_bands, frequency_sweep, phase_portrait, response_spectrum, stability_chart
-from .systems import (
-    BeltOscillator,
-    Chirp,
-    Contact,
-    ContactModel,
-    EnergyRestitution,
-    FourCells,
-    Friction,
-    HalfSine,
-    Harmonic,
-    ImpactPair,
-    InelasticImpact,
-    Load,
-    MavroeidisPapageorgiou,
-    Metainterface,
-    Model,
-    NewtonImpact,
-    OneContactModel,
-    OneCosine,
-    OneSine,
-    PhysicalCell,
-    Ramp,
-    Record,
-    Ricker,
-    RockingBlock,
-    System,
-    ThreeCells,
-    TwoCells,
-    TwoLayer,
-    TwoStops,
-    UnitCell,
-    VelocityReduction,
-    WallOscillator,
-    energy_gain,
-    register,
-)
-
-__all__ = [
-    "BeltOscillator",
-    "Branch",
-    "Chirp",
-    "Contact",
-    "ContactModel",
-    "Ending",
-    "EnergyRestitution",
-    "EventKind",
-    "Exponents",
-    "FourCells",
-    "FreeOrbit",
-    "Friction",
-    "HalfSine",
-    "Harmonic",
-    "ImpactPair",
-    "InelasticImpact",
-    "Load",
-    "MavroeidisPapageorgiou",
-    "Metainterface",
-    "Model",
-    "Motion",
-    "MotionError",
-    "NewtonImpact",
-    "OneContactModel",
-    "OneCosine",
-    "OneSine",
-    "ParameterError",
-    "PeriodicOrbit",
-    "PhysicalCell",
-    "Ramp",
-    "Record",
-    "Ricker",
-    "RockingBlock",
-    "SaltusError",
-    "Sensitivities",
-    "SpecialCurve",
-    "SpecialPoint",
-    "Stop",
-    "SweepError",
-    "System",
-    "ThreeCells",
-    "TraceError",
-    "TwoCells",
-    "TwoLayer",
-    "TwoStops",
-    "UnitCell",
-    "VelocityReduction",
-    "Verdict",
-    "WallOscillator",
-    "attractors",
-    "attractors_along",
-    "backbone",
-    "basins_of_attraction",
-    "bifurcation_diagram",
-    "branch_of",
-    "branches_of",
-    "capture_speed",
-    "chaotic_bands",
-    "classify",
-    "continue_orbit",
-    "continue_special",
-    "doubling_cascade",
-    "energy_gain",
-    "excludes_tori",
-    "find_attractors",
-    "find_orbit",
-    "flow",
-    "free_orbit",
-    "frequency_sweep",
-    "load",
-    "load_study",
-    "lyapunov_many",
-    "lyapunov_spectrum",
-    "mean_dissipated_power",
-    "orbits",
-    "phase_portrait",
-    "plot",
-    "register",
-    "response_spectrum",
-    "save",
-    "search_orbits",
-    "sensitivities",
-    "separatrices",
-    "show_progress",
-    "simulate",
-    "simulate_many",
-    "stability_chart",
-    "stable_manifold",
-    "stop_names",
-    "studies",
-    "sweep",
-    "switch_branch",
-    "systems",
-    "theory",
-    "to_mat",
-    "transmissibility",
-    "zero_one_test",
-]
+from . import attractors as attractors
+from . import flow as flow
+from . import orbits as orbits
+from . import studies as studies
+from . import sweep as sweep
+from . import systems as systems
+from . import theory as theory
+from .attractors import Exponents as Exponents
+from .attractors import Verdict as Verdict
+from .attractors import attractors_along as attractors_along
+from .attractors import basins_of_attraction as basins_of_attraction
+from .attractors import classify as classify
+from .attractors import excludes_tori as excludes_tori
+from .attractors import find_attractors as find_attractors
+from .attractors import lyapunov_many as lyapunov_many
+from .attractors import lyapunov_spectrum as lyapunov_spectrum
+from .attractors import separatrices as separatrices
+from .attractors import stable_manifold as stable_manifold
+from .attractors import zero_one_test as zero_one_test
+from .bounds import capture_speed as capture_speed
+from .branch_tables import branch_of as branch_of
+from .branch_tables import branches_of as branches_of
+from .config import load as load
+from .config import load_study as load_study
+from .config import save as save
+from .config import to_mat as to_mat
+from .errors import MotionError as MotionError
+from .errors import ParameterError as ParameterError
+from .errors import SaltusError as SaltusError
+from .errors import SweepError as SweepError
+from .errors import TraceError as TraceError
+from .flow import Ending as Ending
+from .flow import EventKind as EventKind
+from .flow import Motion as Motion
+from .flow import Sensitivities as Sensitivities
+from .flow import Stop as Stop
+from .flow import sensitivities as sensitivities
+from .flow import simulate as simulate
+from .flow import simulate_many as simulate_many
+from .flow import stop_names as stop_names
+from .orbits import Branch as Branch
+from .orbits import FreeOrbit as FreeOrbit
+from .orbits import PeriodicOrbit as PeriodicOrbit
+from .orbits import SpecialCurve as SpecialCurve
+from .orbits import SpecialPoint as SpecialPoint
+from .orbits import backbone as backbone
+from .orbits import continue_orbit as continue_orbit
+from .orbits import continue_special as continue_special
+from .orbits import doubling_cascade as doubling_cascade
+from .orbits import find_orbit as find_orbit
+from .orbits import free_orbit as free_orbit
+from .orbits import mean_dissipated_power as mean_dissipated_power
+from .orbits import search_orbits as search_orbits
+from .orbits import switch_branch as switch_branch
+from .orbits import transmissibility as transmissibility
+from .plots import plot as plot
+from .progress import show_progress as show_progress
+from .studies import bifurcation_diagram as bifurcation_diagram
+from .studies import chaotic_bands as chaotic_bands
+from .studies import frequency_sweep as frequency_sweep
+from .studies import phase_portrait as phase_portrait
+from .studies import response_spectrum as response_spectrum
+from .studies import stability_chart as stability_chart
+from .systems import BeltOscillator as BeltOscillator
+from .systems import Chirp as Chirp
+from .systems import Contact as Contact
+from .systems import ContactModel as ContactModel
+from .systems import EnergyRestitution as EnergyRestitution
+from .systems import FourCells as FourCells
+from .systems import Friction as Friction
+from .systems import HalfSine as HalfSine
+from .systems import Harmonic as Harmonic
+from .systems import ImpactPair as ImpactPair
+from .systems import InelasticImpact as InelasticImpact
+from .systems import Load as Load
+from .systems import MavroeidisPapageorgiou as MavroeidisPapageorgiou
+from .systems import Metainterface as Metainterface
+from .systems import Model as Model
+from .systems import NewtonImpact as NewtonImpact
+from .systems import OneContactModel as OneContactModel
+from .systems import OneCosine as OneCosine
+from .systems import OneSine as OneSine
+from .systems import PhysicalCell as PhysicalCell
+from .systems import Ramp as Ramp
+from .systems import Record as Record
+from .systems import Ricker as Ricker
+from .systems import RockingBlock as RockingBlock
+from .systems import System as System
+from .systems import ThreeCells as ThreeCells
+from .systems import TwoCells as TwoCells
+from .systems import TwoLayer as TwoLayer
+from .systems import TwoStops as TwoStops
+from .systems import UnitCell as UnitCell
+from .systems import VelocityReduction as VelocityReduction
+from .systems import WallOscillator as WallOscillator
+from .systems import energy_gain as energy_gain
+from .systems import register as register
 
 __version__: str

@@ -1,52 +1,35 @@
-from .along_parameter import attractors_along
-from .attractor import Attractor, Attractors, Target, share_interval
-from .attractor_search import find_attractors
-from .basins.fractal import BasinEntropy, UncertaintyExponent, Wada, basin_entropy, uncertainty_exponent, wada
-from .basins.grid import basins_of_attraction
-from .classification import Verdict, classify
-from .judgement import JUDGEMENT, EarlierJudgement, Judged, JudgementSettings, SettledLater, judge
-from .lyapunov.many_exponents import lyapunov_many
-from .lyapunov.spectrum import Exponents, lyapunov_spectrum
-from .manifolds.phase_plane import Equilibrium, Separatrix, equilibria, separatrices
-from .manifolds.saddle_manifolds import Manifold, stable_manifold, unstable_manifold
-from .reason import Reason
-from .tori import excludes_tori
-from .zero_one import ZeroOne, zero_one_test
-
-__all__ = [
-    "JUDGEMENT",
-    "Attractor",
-    "Attractors",
-    "BasinEntropy",
-    "EarlierJudgement",
-    "Equilibrium",
-    "Exponents",
-    "Judged",
-    "JudgementSettings",
-    "Manifold",
-    "Reason",
-    "Separatrix",
-    "SettledLater",
-    "Target",
-    "UncertaintyExponent",
-    "Verdict",
-    "Wada",
-    "ZeroOne",
-    "attractors_along",
-    "basin_entropy",
-    "basins_of_attraction",
-    "classify",
-    "equilibria",
-    "excludes_tori",
-    "find_attractors",
-    "judge",
-    "lyapunov_many",
-    "lyapunov_spectrum",
-    "separatrices",
-    "share_interval",
-    "stable_manifold",
-    "uncertainty_exponent",
-    "unstable_manifold",
-    "wada",
-    "zero_one_test",
-]
+from .along_parameter import attractors_along as attractors_along
+from .attractor import Attractor as Attractor
+from .attractor import Attractors as Attractors
+from .attractor import Target as Target
+from .attractor import share_interval as share_interval
+from .attractor_search import find_attractors as find_attractors
+from .basins.fractal import BasinEntropy as BasinEntropy
+from .basins.fractal import UncertaintyExponent as UncertaintyExponent
+from .basins.fractal import Wada as Wada
+from .basins.fractal import basin_entropy as basin_entropy
+from .basins.fractal import uncertainty_exponent as uncertainty_exponent
+from .basins.fractal import wada as wada
+from .basins.grid import basins_of_attraction as basins_of_attraction
+from .classification import Verdict as Verdict
+from .classification import classify as classify
+from .judgement import JUDGEMENT as JUDGEMENT
+from .judgement import EarlierJudgement as EarlierJudgement
+from .judgement import Judged as Judged
+from .judgement import JudgementSettings as JudgementSettings
+from .judgement import SettledLater as SettledLater
+from .judgement import judge as judge
+from .lyapunov.many_exponents import lyapunov_many as lyapunov_many
+from .lyapunov.spectrum import Exponents as Exponents
+from .lyapunov.spectrum import lyapunov_spectrum as lyapunov_spectrum
+from .manifolds.phase_plane import Equilibrium as Equilibrium
+from .manifolds.phase_plane import Separatrix as Separatrix
+from .manifolds.phase_plane import equilibria as equilibria
+from .manifolds.phase_plane import separatrices as separatrices
+from .manifolds.saddle_manifolds import Manifold as Manifold
+from .manifolds.saddle_manifolds import stable_manifold as stable_manifold
+from .manifolds.saddle_manifolds import unstable_manifold as unstable_manifold
+from .reason import Reason as Reason
+from .tori import excludes_tori as excludes_tori
+from .zero_one import ZeroOne as ZeroOne
+from .zero_one import zero_one_test as zero_one_test

@@ -1,17 +1,10 @@
-from .capture import capture_speed, keeps_rest, proved_speeds
-from .contraction import area_contraction, leaves_over_a_period, on_side
-from .gap_equation import Leaves, reads
-from .intervals import Interval, enclose
-
-__all__ = [
-    "Interval",
-    "Leaves",
-    "area_contraction",
-    "capture_speed",
-    "enclose",
-    "keeps_rest",
-    "leaves_over_a_period",
-    "on_side",
-    "proved_speeds",
-    "reads",
-]
+from .capture import capture_speed as capture_speed
+from .capture import keeps_rest as keeps_rest
+from .capture import proved_speeds as proved_speeds
+from .contraction import area_contraction as area_contraction
+from .contraction import leaves_over_a_period as leaves_over_a_period
+from .contraction import on_side as on_side
+from .gap_equation import Leaves as Leaves
+from .gap_equation import reads as reads
+from .intervals import Interval as Interval
+from .intervals import enclose as enclose

@@ -1,5 +1,3 @@
-from .drawn_progress import progress_bar
-
-__all__ = ["main", "progress_bar"]
+from .drawn_progress import progress_bar as progress_bar
 
 def main() -> None: ...

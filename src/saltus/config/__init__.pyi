@@ -1,5 +1,8 @@
-from .questions import Ask
-from .results import kind_of, load, open_result, save, to_mat
-from .study import Study, load_study
-
-__all__ = ["Ask", "Study", "kind_of", "load", "load_study", "open_result", "save", "to_mat"]
+from .questions import Ask as Ask
+from .results import kind_of as kind_of
+from .results import load as load
+from .results import open_result as open_result
+from .results import save as save
+from .results import to_mat as to_mat
+from .study import Study as Study
+from .study import load_study as load_study

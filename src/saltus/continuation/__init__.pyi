@@ -1,42 +1,27 @@
-from .continuation_loop import Bounds, Continuation, Watch, both_ways
-from .corrector import NEWTON, Corrected, Evaluation, newton
-from .course import Course
-from .curve import Curve, Point
-from .end import CurveEnd, End, EndReason
-from .events import Cut, Events
-from .missed import CurveMissed, Missed, MissedReason
-from .predictor import between
-from .pseudo_arclength import EquationCurve
-from .step_length import STEPS, StepSettings
-from .test_functions import TestFunction, located
-from .zero import Evidence, Zero
-
-__all__ = [
-    "NEWTON",
-    "STEPS",
-    "Bounds",
-    "Continuation",
-    "Corrected",
-    "Course",
-    "Curve",
-    "CurveEnd",
-    "CurveMissed",
-    "Cut",
-    "End",
-    "EndReason",
-    "EquationCurve",
-    "Evaluation",
-    "Events",
-    "Evidence",
-    "Missed",
-    "MissedReason",
-    "Point",
-    "StepSettings",
-    "TestFunction",
-    "Watch",
-    "Zero",
-    "between",
-    "both_ways",
-    "located",
-    "newton",
-]
+from .continuation_loop import Bounds as Bounds
+from .continuation_loop import Continuation as Continuation
+from .continuation_loop import Watch as Watch
+from .continuation_loop import both_ways as both_ways
+from .corrector import NEWTON as NEWTON
+from .corrector import Corrected as Corrected
+from .corrector import Evaluation as Evaluation
+from .corrector import newton as newton
+from .course import Course as Course
+from .curve import Curve as Curve
+from .curve import Point as Point
+from .end import CurveEnd as CurveEnd
+from .end import End as End
+from .end import EndReason as EndReason
+from .events import Cut as Cut
+from .events import Events as Events
+from .missed import CurveMissed as CurveMissed
+from .missed import Missed as Missed
+from .missed import MissedReason as MissedReason
+from .predictor import between as between
+from .pseudo_arclength import EquationCurve as EquationCurve
+from .step_length import STEPS as STEPS
+from .step_length import StepSettings as StepSettings
+from .test_functions import TestFunction as TestFunction
+from .test_functions import located as located
+from .zero import Evidence as Evidence
+from .zero import Zero as Zero

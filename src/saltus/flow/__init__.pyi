@@ -1,90 +1,55 @@
-from .contacts.layout import SegmentEnd, SegmentExtremes, SegmentPlan
-from .kernel.layout import SegmentColumn, SegmentValue
-from .kernel.memory_layout import EventCode
-from .kernel.orbit_segments import SegmentFollower, load_segments
-from .kernel.structures import Program, limits_of, program
-from .lanes.capture_speeds import captured_between
-from .lanes.ensemble import TangentEnsemble, simulate_many
-from .lanes.ensemble_dataset import extrema_names, stop_names, stroboscopic
-from .lanes.inputs import Inputs, read_inputs
-from .lanes.threads import available_cores, share_cores
-from .long_time.approach import approached
-from .long_time.load_release import Release, contact_pull, load_releases, peak_near
-from .long_time.recurrence import (
-    RECURRENCE,
-    Ending,
-    Recurrence,
-    RecurrenceSettings,
-    ensemble_from,
-    find_recurrence,
-    last_states,
-    motions_from,
-    nearest_return,
-    return_distances,
-    return_period,
-)
-from .motion.events import Event, EventKind, Impacts, Stop, modes_of
-from .motion.motion import Motion, rate_name, state_names
-from .motion.request import MotionRequest
-from .motion.sensitivities import Sensitivities, derivatives_of, sensitivities, state_rates
-from .motion.simulate import simulate
-from .motion.validity import DenseOutput, Validity
-from .one_contact.regularity import ContactRegularity, contact_regularity
-
-__all__ = [
-    "RECURRENCE",
-    "ContactRegularity",
-    "DenseOutput",
-    "Ending",
-    "Event",
-    "EventCode",
-    "EventKind",
-    "Impacts",
-    "Inputs",
-    "Motion",
-    "MotionRequest",
-    "Program",
-    "Recurrence",
-    "RecurrenceSettings",
-    "Release",
-    "SegmentColumn",
-    "SegmentEnd",
-    "SegmentExtremes",
-    "SegmentFollower",
-    "SegmentPlan",
-    "SegmentValue",
-    "Sensitivities",
-    "Stop",
-    "TangentEnsemble",
-    "Validity",
-    "approached",
-    "available_cores",
-    "captured_between",
-    "contact_pull",
-    "contact_regularity",
-    "derivatives_of",
-    "ensemble_from",
-    "extrema_names",
-    "find_recurrence",
-    "last_states",
-    "limits_of",
-    "load_releases",
-    "load_segments",
-    "modes_of",
-    "motions_from",
-    "nearest_return",
-    "peak_near",
-    "program",
-    "rate_name",
-    "read_inputs",
-    "return_distances",
-    "return_period",
-    "sensitivities",
-    "share_cores",
-    "simulate",
-    "simulate_many",
-    "state_names",
-    "state_rates",
-    "stop_names",
-    "stroboscopic",
-]
+from .contacts.layout import SegmentEnd as SegmentEnd
+from .contacts.layout import SegmentExtremes as SegmentExtremes
+from .contacts.layout import SegmentPlan as SegmentPlan
+from .kernel.layout import SegmentColumn as SegmentColumn
+from .kernel.layout import SegmentValue as SegmentValue
+from .kernel.memory_layout import EventCode as EventCode
+from .kernel.orbit_segments import SegmentFollower as SegmentFollower
+from .kernel.orbit_segments import load_segments as load_segments
+from .kernel.structures import Program as Program
+from .kernel.structures import limits_of as limits_of
+from .kernel.structures import program as program
+from .lanes.capture_speeds import captured_between as captured_between
+from .lanes.ensemble import TangentEnsemble as TangentEnsemble
+from .lanes.ensemble import simulate_many as simulate_many
+from .lanes.ensemble_dataset import extrema_names as extrema_names
+from .lanes.ensemble_dataset import stop_names as stop_names
+from .lanes.ensemble_dataset import stroboscopic as stroboscopic
+from .lanes.inputs import Inputs as Inputs
+from .lanes.inputs import read_inputs as read_inputs
+from .lanes.threads import available_cores as available_cores
+from .lanes.threads import share_cores as share_cores
+from .long_time.approach import approached as approached
+from .long_time.load_release import Release as Release
+from .long_time.load_release import contact_pull as contact_pull
+from .long_time.load_release import load_releases as load_releases
+from .long_time.load_release import peak_near as peak_near
+from .long_time.recurrence import RECURRENCE as RECURRENCE
+from .long_time.recurrence import Ending as Ending
+from .long_time.recurrence import Recurrence as Recurrence
+from .long_time.recurrence import RecurrenceSettings as RecurrenceSettings
+from .long_time.recurrence import ensemble_from as ensemble_from
+from .long_time.recurrence import find_recurrence as find_recurrence
+from .long_time.recurrence import last_states as last_states
+from .long_time.recurrence import motions_from as motions_from
+from .long_time.recurrence import nearest_return as nearest_return
+from .long_time.recurrence import return_distances as return_distances
+from .long_time.recurrence import return_period as return_period
+from .motion.events import Event as Event
+from .motion.events import EventKind as EventKind
+from .motion.events import Impacts as Impacts
+from .motion.events import Stop as Stop
+from .motion.events import modes_of as modes_of
+from .motion.motion import Motion as Motion
+from .motion.motion import rate_name as rate_name
+from .motion.motion import state_names as state_names
+from .motion.request import MotionRequest as MotionRequest
+from .motion.sensitivities import Sensitivities as Sensitivities
+from .motion.sensitivities import derivatives_of as derivatives_of
+from .motion.sensitivities import sensitivities as sensitivities
+from .motion.sensitivities import state_rates as state_rates
+from .motion.simulate import simulate as simulate
+from .motion.validity import DenseOutput as DenseOutput
+from .motion.validity import Validity as Validity
+from .one_contact.regularity import ContactRegularity as ContactRegularity
+from .one_contact.regularity import contact_regularity as contact_regularity

@@ -1,60 +1,38 @@
-from .averages_over_time import mean_dissipated_power, transmissibility
-from .branches.branch import Branch
-from .branches.branch_continuation import STEP, continue_orbit, follow_stable
-from .branches.from_dataset import orbits_of
-from .branches.special_curve import SpecialCurve
-from .branches.special_curve_continuation import continue_special
-from .branches.special_point import OrbitEnd, SpecialKind, SpecialPoint
-from .branches.switching import Cascade, doubling_cascade, switch_branch
-from .equations.kinds import equations_of
-from .equations.one_contact import OneContactEquations
-from .finding.from_motion import find_orbit, orbit_from
-from .finding.near_returns import orbits_near_returns, solved_near
-from .finding.search import Search, search_orbits
-from .free_orbits import FreeOrbit, NoFreeOrbit, backbone, free_orbit
-from .orbit import PeriodicOrbit, solve
-from .orbits_as_json import as_json, from_json
-from .signature import Signature
-from .symmetry import is_symmetric, keeps_symmetry
-from .verify import closing_distances, closing_rows, defects, same_orbit
-
-__all__ = [
-    "STEP",
-    "Branch",
-    "Cascade",
-    "FreeOrbit",
-    "NoFreeOrbit",
-    "OneContactEquations",
-    "OrbitEnd",
-    "PeriodicOrbit",
-    "Search",
-    "Signature",
-    "SpecialCurve",
-    "SpecialKind",
-    "SpecialPoint",
-    "as_json",
-    "backbone",
-    "closing_distances",
-    "closing_rows",
-    "continue_orbit",
-    "continue_special",
-    "defects",
-    "doubling_cascade",
-    "equations_of",
-    "find_orbit",
-    "follow_stable",
-    "free_orbit",
-    "from_json",
-    "is_symmetric",
-    "keeps_symmetry",
-    "mean_dissipated_power",
-    "orbit_from",
-    "orbits_near_returns",
-    "orbits_of",
-    "same_orbit",
-    "search_orbits",
-    "solve",
-    "solved_near",
-    "switch_branch",
-    "transmissibility",
-]
+from .averages_over_time import mean_dissipated_power as mean_dissipated_power
+from .averages_over_time import transmissibility as transmissibility
+from .branches.branch import Branch as Branch
+from .branches.branch_continuation import STEP as STEP
+from .branches.branch_continuation import continue_orbit as continue_orbit
+from .branches.branch_continuation import follow_stable as follow_stable
+from .branches.from_dataset import orbits_of as orbits_of
+from .branches.special_curve import SpecialCurve as SpecialCurve
+from .branches.special_curve_continuation import continue_special as continue_special
+from .branches.special_point import OrbitEnd as OrbitEnd
+from .branches.special_point import SpecialKind as SpecialKind
+from .branches.special_point import SpecialPoint as SpecialPoint
+from .branches.switching import Cascade as Cascade
+from .branches.switching import doubling_cascade as doubling_cascade
+from .branches.switching import switch_branch as switch_branch
+from .equations.kinds import equations_of as equations_of
+from .equations.one_contact import OneContactEquations as OneContactEquations
+from .finding.from_motion import find_orbit as find_orbit
+from .finding.from_motion import orbit_from as orbit_from
+from .finding.near_returns import orbits_near_returns as orbits_near_returns
+from .finding.near_returns import solved_near as solved_near
+from .finding.search import Search as Search
+from .finding.search import search_orbits as search_orbits
+from .free_orbits import FreeOrbit as FreeOrbit
+from .free_orbits import NoFreeOrbit as NoFreeOrbit
+from .free_orbits import backbone as backbone
+from .free_orbits import free_orbit as free_orbit
+from .orbit import PeriodicOrbit as PeriodicOrbit
+from .orbit import solve as solve
+from .orbits_as_json import as_json as as_json
+from .orbits_as_json import from_json as from_json
+from .signature import Signature as Signature
+from .symmetry import is_symmetric as is_symmetric
+from .symmetry import keeps_symmetry as keeps_symmetry
+from .verify import closing_distances as closing_distances
+from .verify import closing_rows as closing_rows
+from .verify import defects as defects
+from .verify import same_orbit as same_orbit

@@ -1,94 +1,51 @@
-from .any_result import DRAWINGS, plot
-from .basins import draw_basins
-from .branch_cuts import BranchLine, ModelValidity, border_curves, branch_lines, smooth_lines
-from .chart import chart_legend, data_is_tree, draw_chart, draw_closed_form, draw_lines
-from .conventions import (
-    DASHES,
-    DOUBLE_COLUMN,
-    FAINT,
-    INK,
-    SEPARATRIX_LINE,
-    SINGLE_COLUMN,
-    STABLE,
-    STABLE_LINE,
-    UNSTABLE,
-    UNSTABLE_LINE,
-    figure_of,
-    new_figure,
-    panel_label,
-    shades,
-    style,
-    styled,
-)
-from .curves import draw_branch
-from .diagram import POINTS
-from .marks import arrow_along, fixed_points, limit_lines
-from .motion import draw_motion
-from .plane import draw_arrows
-from .response import (
-    draw_bands,
-    draw_branches,
-    draw_critical,
-    draw_limits,
-    draw_response,
-    draw_special,
-    highest,
-    lowest,
-    note_missed,
-    response_legend,
-)
-from .unit_cell import draw_cell, draw_frames, label_deformed, label_heights, label_undeformed
-
-__all__ = [
-    "DASHES",
-    "DOUBLE_COLUMN",
-    "DRAWINGS",
-    "FAINT",
-    "INK",
-    "POINTS",
-    "SEPARATRIX_LINE",
-    "SINGLE_COLUMN",
-    "STABLE",
-    "STABLE_LINE",
-    "UNSTABLE",
-    "UNSTABLE_LINE",
-    "BranchLine",
-    "ModelValidity",
-    "arrow_along",
-    "border_curves",
-    "branch_lines",
-    "chart_legend",
-    "data_is_tree",
-    "draw_arrows",
-    "draw_bands",
-    "draw_basins",
-    "draw_branch",
-    "draw_branches",
-    "draw_cell",
-    "draw_chart",
-    "draw_closed_form",
-    "draw_critical",
-    "draw_frames",
-    "draw_limits",
-    "draw_lines",
-    "draw_motion",
-    "draw_response",
-    "draw_special",
-    "figure_of",
-    "fixed_points",
-    "highest",
-    "label_deformed",
-    "label_heights",
-    "label_undeformed",
-    "limit_lines",
-    "lowest",
-    "new_figure",
-    "note_missed",
-    "panel_label",
-    "plot",
-    "response_legend",
-    "shades",
-    "smooth_lines",
-    "style",
-    "styled",
-]
+from .any_result import DRAWINGS as DRAWINGS
+from .any_result import plot as plot
+from .basins import draw_basins as draw_basins
+from .branch_cuts import BranchLine as BranchLine
+from .branch_cuts import ModelValidity as ModelValidity
+from .branch_cuts import border_curves as border_curves
+from .branch_cuts import branch_lines as branch_lines
+from .branch_cuts import smooth_lines as smooth_lines
+from .chart import chart_legend as chart_legend
+from .chart import data_is_tree as data_is_tree
+from .chart import draw_chart as draw_chart
+from .chart import draw_closed_form as draw_closed_form
+from .chart import draw_lines as draw_lines
+from .conventions import DASHES as DASHES
+from .conventions import DOUBLE_COLUMN as DOUBLE_COLUMN
+from .conventions import FAINT as FAINT
+from .conventions import INK as INK
+from .conventions import SEPARATRIX_LINE as SEPARATRIX_LINE
+from .conventions import SINGLE_COLUMN as SINGLE_COLUMN
+from .conventions import STABLE as STABLE
+from .conventions import STABLE_LINE as STABLE_LINE
+from .conventions import UNSTABLE as UNSTABLE
+from .conventions import UNSTABLE_LINE as UNSTABLE_LINE
+from .conventions import figure_of as figure_of
+from .conventions import new_figure as new_figure
+from .conventions import panel_label as panel_label
+from .conventions import shades as shades
+from .conventions import style as style
+from .conventions import styled as styled
+from .curves import draw_branch as draw_branch
+from .diagram import POINTS as POINTS
+from .marks import arrow_along as arrow_along
+from .marks import fixed_points as fixed_points
+from .marks import limit_lines as limit_lines
+from .motion import draw_motion as draw_motion
+from .plane import draw_arrows as draw_arrows
+from .response import draw_bands as draw_bands
+from .response import draw_branches as draw_branches
+from .response import draw_critical as draw_critical
+from .response import draw_limits as draw_limits
+from .response import draw_response as draw_response
+from .response import draw_special as draw_special
+from .response import highest as highest
+from .response import lowest as lowest
+from .response import note_missed as note_missed
+from .response import response_legend as response_legend
+from .unit_cell import draw_cell as draw_cell
+from .unit_cell import draw_frames as draw_frames
+from .unit_cell import label_deformed as label_deformed
+from .unit_cell import label_heights as label_heights
+from .unit_cell import label_undeformed as label_undeformed

@@ -1,21 +1,11 @@
-from .chart.borders import Borders, with_borders
-from .chart.chart_checks import disagreements, wrong_cells
-from .chart.chart_study import bordered_chart, stability_chart
-from .diagram.chaos_search import chaotic_bands
-from .diagram.diagram_study import bifurcation_diagram, response_spectrum
-from .portrait import phase_portrait
-from .swept_parameter import frequency_sweep
-
-__all__ = [
-    "Borders",
-    "bifurcation_diagram",
-    "bordered_chart",
-    "chaotic_bands",
-    "disagreements",
-    "frequency_sweep",
-    "phase_portrait",
-    "response_spectrum",
-    "stability_chart",
-    "with_borders",
-    "wrong_cells",
-]
+from .chart.borders import Borders as Borders
+from .chart.borders import with_borders as with_borders
+from .chart.chart_checks import disagreements as disagreements
+from .chart.chart_checks import wrong_cells as wrong_cells
+from .chart.chart_study import bordered_chart as bordered_chart
+from .chart.chart_study import stability_chart as stability_chart
+from .diagram.chaos_search import chaotic_bands as chaotic_bands
+from .diagram.diagram_study import bifurcation_diagram as bifurcation_diagram
+from .diagram.diagram_study import response_spectrum as response_spectrum
+from .portrait import phase_portrait as phase_portrait
+from .swept_parameter import frequency_sweep as frequency_sweep

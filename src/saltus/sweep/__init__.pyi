@@ -1,30 +1,19 @@
-from .chunks import Failure
-from .cluster import on_cluster
-from .execution import SweepInterrupted, check_run, run
-from .memo import Memo, MemoKind
-from .plan import Plan, Variable
-from .store import BEGIN_ANEW, check_store, open_store, opened, remove_store
-from .store_status import StoreStatus, damage, read_plan, status
-from .workers import Workers
-
-__all__ = [
-    "BEGIN_ANEW",
-    "Failure",
-    "Memo",
-    "MemoKind",
-    "Plan",
-    "StoreStatus",
-    "SweepInterrupted",
-    "Variable",
-    "Workers",
-    "check_run",
-    "check_store",
-    "damage",
-    "on_cluster",
-    "open_store",
-    "opened",
-    "read_plan",
-    "remove_store",
-    "run",
-    "status",
-]
+from .chunks import Failure as Failure
+from .cluster import on_cluster as on_cluster
+from .execution import SweepInterrupted as SweepInterrupted
+from .execution import check_run as check_run
+from .execution import run as run
+from .memo import Memo as Memo
+from .memo import MemoKind as MemoKind
+from .plan import Plan as Plan
+from .plan import Variable as Variable
+from .store import BEGIN_ANEW as BEGIN_ANEW
+from .store import check_store as check_store
+from .store import open_store as open_store
+from .store import opened as opened
+from .store import remove_store as remove_store
+from .store_status import StoreStatus as StoreStatus
+from .store_status import damage as damage
+from .store_status import read_plan as read_plan
+from .store_status import status as status
+from .workers import Workers as Workers

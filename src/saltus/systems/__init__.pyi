@@ -1,154 +1,89 @@
-from .cell_chain import FourCells, ThreeCells, TwoCells
-from .contact import Contact, Friction
-from .contact_model import (
-    ContactModel,
-    apart,
-    constrained_acceleration,
-    mass_and_force,
-    normal_forces,
-    reactions,
-    stick_margins,
-)
-from .impact_laws import (
-    EnergyRestitution,
-    ImpactLaw,
-    InelasticImpact,
-    NewtonImpact,
-    VelocityReduction,
-    energy_gain,
-    energy_gains,
-)
-from .load import Channel, DeclaredLoad, Load
-from .metainterface import Metainterface
-from .mirror import contact_images, image_of
-from .model import MarginKind, Model, OneContactModel
-from .oscillators import BeltOscillator, ImpactPair, TwoStops, WallOscillator
-from .parameter_tables import (
-    broadcast_arrays,
-    check_along,
-    check_parameters,
-    check_path,
-    distinct_rows,
-    finite_array,
-    parameter_table,
-)
-from .parameters import children, is_number, numbers, substitute
-from .pulses import Chirp, HalfSine, MavroeidisPapageorgiou, OneCosine, OneSine, Pulse, Ramp, Ricker
-from .registry import IMPACTS, MODELS, register
-from .reversed import reversed_system
-from .rocking_block import RockingBlock
-from .scenarios import LayerState, Scenario, name_impact, other_impulse, table_1
-from .serial import signal_class
-from .si_units import PhysicalCell
-from .signals import Constant, Harmonic, Record, Signal, Sum
-from .start_state import arguments_of, read_start, read_starts, state_of
-from .states import (
-    Box,
-    Window,
-    before_impacts,
-    check_reached,
-    check_window,
-    even_steps,
-    held_by_contacts,
-    initial_states,
-    is_still,
-    on_this_side,
-    rest_state,
-    states_beside,
-    within_window,
-)
-from .system import System, check_system
-from .two_layer import TwoLayer
-from .unit_cell import UnitCell
-
-__all__ = [
-    "IMPACTS",
-    "MODELS",
-    "BeltOscillator",
-    "Box",
-    "Channel",
-    "Chirp",
-    "Constant",
-    "Contact",
-    "ContactModel",
-    "DeclaredLoad",
-    "EnergyRestitution",
-    "FourCells",
-    "Friction",
-    "HalfSine",
-    "Harmonic",
-    "ImpactLaw",
-    "ImpactPair",
-    "InelasticImpact",
-    "LayerState",
-    "Load",
-    "MarginKind",
-    "MavroeidisPapageorgiou",
-    "Metainterface",
-    "Model",
-    "NewtonImpact",
-    "OneContactModel",
-    "OneCosine",
-    "OneSine",
-    "PhysicalCell",
-    "Pulse",
-    "Ramp",
-    "Record",
-    "Ricker",
-    "RockingBlock",
-    "Scenario",
-    "Signal",
-    "Sum",
-    "System",
-    "ThreeCells",
-    "TwoCells",
-    "TwoLayer",
-    "TwoStops",
-    "UnitCell",
-    "VelocityReduction",
-    "WallOscillator",
-    "Window",
-    "apart",
-    "arguments_of",
-    "before_impacts",
-    "broadcast_arrays",
-    "check_along",
-    "check_parameters",
-    "check_path",
-    "check_reached",
-    "check_system",
-    "check_window",
-    "children",
-    "constrained_acceleration",
-    "contact_images",
-    "distinct_rows",
-    "energy_gain",
-    "energy_gains",
-    "even_steps",
-    "finite_array",
-    "held_by_contacts",
-    "image_of",
-    "initial_states",
-    "is_number",
-    "is_still",
-    "mass_and_force",
-    "name_impact",
-    "normal_forces",
-    "numbers",
-    "on_this_side",
-    "other_impulse",
-    "parameter_table",
-    "reactions",
-    "read_start",
-    "read_starts",
-    "register",
-    "rest_state",
-    "reversed_system",
-    "signal_class",
-    "state_of",
-    "states_beside",
-    "stick_margins",
-    "substitute",
-    "table_1",
-    "within_window",
-]
+from .cell_chain import FourCells as FourCells
+from .cell_chain import ThreeCells as ThreeCells
+from .cell_chain import TwoCells as TwoCells
+from .contact import Contact as Contact
+from .contact import Friction as Friction
+from .contact_model import ContactModel as ContactModel
+from .contact_model import apart as apart
+from .contact_model import constrained_acceleration as constrained_acceleration
+from .contact_model import mass_and_force as mass_and_force
+from .contact_model import normal_forces as normal_forces
+from .contact_model import reactions as reactions
+from .contact_model import stick_margins as stick_margins
+from .impact_laws import EnergyRestitution as EnergyRestitution
+from .impact_laws import ImpactLaw as ImpactLaw
+from .impact_laws import InelasticImpact as InelasticImpact
+from .impact_laws import NewtonImpact as NewtonImpact
+from .impact_laws import VelocityReduction as VelocityReduction
+from .impact_laws import energy_gain as energy_gain
+from .impact_laws import energy_gains as energy_gains
+from .load import Channel as Channel
+from .load import DeclaredLoad as DeclaredLoad
+from .load import Load as Load
+from .metainterface import Metainterface as Metainterface
+from .mirror import contact_images as contact_images
+from .mirror import image_of as image_of
+from .model import MarginKind as MarginKind
+from .model import Model as Model
+from .model import OneContactModel as OneContactModel
+from .oscillators import BeltOscillator as BeltOscillator
+from .oscillators import ImpactPair as ImpactPair
+from .oscillators import TwoStops as TwoStops
+from .oscillators import WallOscillator as WallOscillator
+from .parameter_tables import broadcast_arrays as broadcast_arrays
+from .parameter_tables import check_along as check_along
+from .parameter_tables import check_parameters as check_parameters
+from .parameter_tables import check_path as check_path
+from .parameter_tables import distinct_rows as distinct_rows
+from .parameter_tables import finite_array as finite_array
+from .parameter_tables import parameter_table as parameter_table
+from .parameters import children as children
+from .parameters import is_number as is_number
+from .parameters import numbers as numbers
+from .parameters import substitute as substitute
+from .pulses import Chirp as Chirp
+from .pulses import HalfSine as HalfSine
+from .pulses import MavroeidisPapageorgiou as MavroeidisPapageorgiou
+from .pulses import OneCosine as OneCosine
+from .pulses import OneSine as OneSine
+from .pulses import Pulse as Pulse
+from .pulses import Ramp as Ramp
+from .pulses import Ricker as Ricker
+from .registry import IMPACTS as IMPACTS
+from .registry import MODELS as MODELS
+from .registry import register as register
+from .reversed import reversed_system as reversed_system
+from .rocking_block import RockingBlock as RockingBlock
+from .scenarios import LayerState as LayerState
+from .scenarios import Scenario as Scenario
+from .scenarios import name_impact as name_impact
+from .scenarios import other_impulse as other_impulse
+from .scenarios import table_1 as table_1
+from .serial import signal_class as signal_class
+from .si_units import PhysicalCell as PhysicalCell
+from .signals import Constant as Constant
+from .signals import Harmonic as Harmonic
+from .signals import Record as Record
+from .signals import Signal as Signal
+from .signals import Sum as Sum
+from .start_state import arguments_of as arguments_of
+from .start_state import read_start as read_start
+from .start_state import read_starts as read_starts
+from .start_state import state_of as state_of
+from .states import Box as Box
+from .states import Window as Window
+from .states import before_impacts as before_impacts
+from .states import check_reached as check_reached
+from .states import check_window as check_window
+from .states import even_steps as even_steps
+from .states import held_by_contacts as held_by_contacts
+from .states import initial_states as initial_states
+from .states import is_still as is_still
+from .states import on_this_side as on_this_side
+from .states import rest_state as rest_state
+from .states import states_beside as states_beside
+from .states import within_window as within_window
+from .system import System as System
+from .system import check_system as check_system
+from .two_layer import TwoLayer as TwoLayer
+from .unit_cell import UnitCell as UnitCell

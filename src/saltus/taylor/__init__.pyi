@@ -1,121 +1,81 @@
-from .cache import cache_directory, digest, source_of
-from .common_form import CommonForm
-from .derivatives import FREQUENCY, derivative_along, partial_derivative, tangent_leaves, time_derivative
-from .equations import equations_of, structure_key
-from .exact_algebra import Form, NoNormalForm, constant, constant_value, normal_form
-from .generated import Case, SeriesOf, WrittenFunction, functions_text, load_functions
-from .graph import RECORD_WIDTH, Expr, differentiate, is_steep, number, ordered, substitute
-from .kernels import by_reference, cached_jit, compiled_part, inline_jit, is_compiled, jit, lean_jit, load_module, module_name
-from .lane_memory import LanesType, LaneType, named_tuple, one, shared_as
-from .lane_vectors import (
-    ALL,
-    absolute,
-    bits,
-    first_lane,
-    fma,
-    lane_count,
-    mask,
-    maximum,
-    minimum,
-    rough_exp2,
-    rough_inverse,
-    rough_log2,
-    rough_root,
-    select,
-    splat,
-    vector_lane,
-    with_lane,
-)
-from .load_tables import anchor, expand_record, own_records, record_table, record_tables
-from .memory import Places
-from .numba_types import Pointer, function_type, written_type
-from .private_numba import entry_point, pointer
-from .rules import FUNCTIONS
-from .series import Rows
-from .tapes import shared_constants, tape
-from .tracing import Trace, check_size, trace
-from .vectors import CACHE_LINE, LANES, SCALAR, WIDTH
-
-__all__ = [
-    "ALL",
-    "CACHE_LINE",
-    "FREQUENCY",
-    "FUNCTIONS",
-    "LANES",
-    "RECORD_WIDTH",
-    "SCALAR",
-    "WIDTH",
-    "Case",
-    "CommonForm",
-    "Expr",
-    "Form",
-    "LaneType",
-    "LanesType",
-    "NoNormalForm",
-    "Places",
-    "Pointer",
-    "Rows",
-    "SeriesOf",
-    "Trace",
-    "WrittenFunction",
-    "absolute",
-    "anchor",
-    "bits",
-    "by_reference",
-    "cache_directory",
-    "cached_jit",
-    "check_size",
-    "compiled_part",
-    "constant",
-    "constant_value",
-    "derivative_along",
-    "differentiate",
-    "digest",
-    "entry_point",
-    "equations_of",
-    "expand_record",
-    "first_lane",
-    "fma",
-    "function_type",
-    "functions_text",
-    "inline_jit",
-    "is_compiled",
-    "is_steep",
-    "jit",
-    "lane_count",
-    "lean_jit",
-    "load_functions",
-    "load_module",
-    "mask",
-    "maximum",
-    "minimum",
-    "module_name",
-    "named_tuple",
-    "normal_form",
-    "number",
-    "one",
-    "ordered",
-    "own_records",
-    "partial_derivative",
-    "pointer",
-    "record_table",
-    "record_tables",
-    "rough_exp2",
-    "rough_inverse",
-    "rough_log2",
-    "rough_root",
-    "select",
-    "shared_as",
-    "shared_constants",
-    "source_of",
-    "splat",
-    "structure_key",
-    "substitute",
-    "tangent_leaves",
-    "tape",
-    "time_derivative",
-    "trace",
-    "vector_lane",
-    "with_lane",
-    "written_type",
-]
+from .cache import cache_directory as cache_directory
+from .cache import digest as digest
+from .cache import source_of as source_of
+from .common_form import CommonForm as CommonForm
+from .derivatives import FREQUENCY as FREQUENCY
+from .derivatives import derivative_along as derivative_along
+from .derivatives import partial_derivative as partial_derivative
+from .derivatives import tangent_leaves as tangent_leaves
+from .derivatives import time_derivative as time_derivative
+from .equations import equations_of as equations_of
+from .equations import structure_key as structure_key
+from .exact_algebra import Form as Form
+from .exact_algebra import NoNormalForm as NoNormalForm
+from .exact_algebra import constant as constant
+from .exact_algebra import constant_value as constant_value
+from .exact_algebra import normal_form as normal_form
+from .generated import Case as Case
+from .generated import SeriesOf as SeriesOf
+from .generated import WrittenFunction as WrittenFunction
+from .generated import functions_text as functions_text
+from .generated import load_functions as load_functions
+from .graph import RECORD_WIDTH as RECORD_WIDTH
+from .graph import Expr as Expr
+from .graph import differentiate as differentiate
+from .graph import is_steep as is_steep
+from .graph import number as number
+from .graph import ordered as ordered
+from .graph import substitute as substitute
+from .kernels import by_reference as by_reference
+from .kernels import cached_jit as cached_jit
+from .kernels import compiled_part as compiled_part
+from .kernels import inline_jit as inline_jit
+from .kernels import is_compiled as is_compiled
+from .kernels import jit as jit
+from .kernels import lean_jit as lean_jit
+from .kernels import load_module as load_module
+from .kernels import module_name as module_name
+from .lane_memory import LanesType as LanesType
+from .lane_memory import LaneType as LaneType
+from .lane_memory import named_tuple as named_tuple
+from .lane_memory import one as one
+from .lane_memory import shared_as as shared_as
+from .lane_vectors import ALL as ALL
+from .lane_vectors import absolute as absolute
+from .lane_vectors import bits as bits
+from .lane_vectors import first_lane as first_lane
+from .lane_vectors import fma as fma
+from .lane_vectors import lane_count as lane_count
+from .lane_vectors import mask as mask
+from .lane_vectors import maximum as maximum
+from .lane_vectors import minimum as minimum
+from .lane_vectors import rough_exp2 as rough_exp2
+from .lane_vectors import rough_inverse as rough_inverse
+from .lane_vectors import rough_log2 as rough_log2
+from .lane_vectors import rough_root as rough_root
+from .lane_vectors import select as select
+from .lane_vectors import splat as splat
+from .lane_vectors import vector_lane as vector_lane
+from .lane_vectors import with_lane as with_lane
+from .load_tables import anchor as anchor
+from .load_tables import expand_record as expand_record
+from .load_tables import own_records as own_records
+from .load_tables import record_table as record_table
+from .load_tables import record_tables as record_tables
+from .memory import Places as Places
+from .numba_types import Pointer as Pointer
+from .numba_types import function_type as function_type
+from .numba_types import written_type as written_type
+from .private_numba import entry_point as entry_point
+from .private_numba import pointer as pointer
+from .rules import FUNCTIONS as FUNCTIONS
+from .series import Rows as Rows
+from .tapes import shared_constants as shared_constants
+from .tapes import tape as tape
+from .tracing import Trace as Trace
+from .tracing import check_size as check_size
+from .tracing import trace as trace
+from .vectors import CACHE_LINE as CACHE_LINE
+from .vectors import LANES as LANES
+from .vectors import SCALAR as SCALAR
+from .vectors import WIDTH as WIDTH

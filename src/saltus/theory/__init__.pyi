@@ -1,107 +1,57 @@
-from .bouncing import Peaks, peaks, reciprocal, unloaded_half_periods, unloaded_peak_ratio, unloaded_period
-from .high_frequency import high_frequency_onset
-from .impact_oscillator import WallOrbit, WallOrbits, wall_orbits
-from .layer import Layer, layers, open_layer, potential_energy, potential_slope, total_energy
-from .loaded_equilibria import (
-    Divergence,
-    LoadedEquilibrium,
-    Stability,
-    divergence,
-    equilibria,
-    linear_equilibria,
-    undeformed_stability,
-)
-from .mechanism_limits import AmplitudeLimit, amplitude_limits
-from .piecewise_linear import LinearMotion, linear_motion
-from .quasi_static import (
-    QuasiStaticBorder,
-    critical_horizontal,
-    equivalent_angle,
-    fold_curve,
-    fold_horizontal,
-    is_monostable,
-    quasi_static_border,
-    static_angle,
-    subcritical_vertical,
-    unloaded_fold,
-)
-from .restitution import InelasticContact, energy_factor, energy_jump, inelastic_contact, velocity_factor
-from .rocking import (
-    housner_restitution,
-    rocking_energy_decreases,
-    rocking_energy_jump,
-    rocking_period,
-    short_rocking_period,
-    slender_rocking_period,
-)
-from .small_vibrations import (
-    Vibration,
-    decayed_amplitude,
-    decayed_period,
-    final_time,
-    linear_period,
-    pendulum_acceleration,
-    short_period,
-    upright_period,
-    vibrations,
-)
-
-__all__ = [
-    "AmplitudeLimit",
-    "Divergence",
-    "InelasticContact",
-    "Layer",
-    "LinearMotion",
-    "LoadedEquilibrium",
-    "Peaks",
-    "QuasiStaticBorder",
-    "Stability",
-    "Vibration",
-    "WallOrbit",
-    "WallOrbits",
-    "amplitude_limits",
-    "critical_horizontal",
-    "decayed_amplitude",
-    "decayed_period",
-    "divergence",
-    "energy_factor",
-    "energy_jump",
-    "equilibria",
-    "equivalent_angle",
-    "final_time",
-    "fold_curve",
-    "fold_horizontal",
-    "high_frequency_onset",
-    "housner_restitution",
-    "inelastic_contact",
-    "is_monostable",
-    "layers",
-    "linear_equilibria",
-    "linear_motion",
-    "linear_period",
-    "open_layer",
-    "peaks",
-    "pendulum_acceleration",
-    "potential_energy",
-    "potential_slope",
-    "quasi_static_border",
-    "reciprocal",
-    "rocking_energy_decreases",
-    "rocking_energy_jump",
-    "rocking_period",
-    "short_period",
-    "short_rocking_period",
-    "slender_rocking_period",
-    "static_angle",
-    "subcritical_vertical",
-    "total_energy",
-    "undeformed_stability",
-    "unloaded_fold",
-    "unloaded_half_periods",
-    "unloaded_peak_ratio",
-    "unloaded_period",
-    "upright_period",
-    "velocity_factor",
-    "vibrations",
-    "wall_orbits",
-]
+from .bouncing import Peaks as Peaks
+from .bouncing import peaks as peaks
+from .bouncing import reciprocal as reciprocal
+from .bouncing import unloaded_half_periods as unloaded_half_periods
+from .bouncing import unloaded_peak_ratio as unloaded_peak_ratio
+from .bouncing import unloaded_period as unloaded_period
+from .high_frequency import high_frequency_onset as high_frequency_onset
+from .impact_oscillator import WallOrbit as WallOrbit
+from .impact_oscillator import WallOrbits as WallOrbits
+from .impact_oscillator import wall_orbits as wall_orbits
+from .layer import Layer as Layer
+from .layer import layers as layers
+from .layer import open_layer as open_layer
+from .layer import potential_energy as potential_energy
+from .layer import potential_slope as potential_slope
+from .layer import total_energy as total_energy
+from .loaded_equilibria import Divergence as Divergence
+from .loaded_equilibria import LoadedEquilibrium as LoadedEquilibrium
+from .loaded_equilibria import Stability as Stability
+from .loaded_equilibria import divergence as divergence
+from .loaded_equilibria import equilibria as equilibria
+from .loaded_equilibria import linear_equilibria as linear_equilibria
+from .loaded_equilibria import undeformed_stability as undeformed_stability
+from .mechanism_limits import AmplitudeLimit as AmplitudeLimit
+from .mechanism_limits import amplitude_limits as amplitude_limits
+from .piecewise_linear import LinearMotion as LinearMotion
+from .piecewise_linear import linear_motion as linear_motion
+from .quasi_static import QuasiStaticBorder as QuasiStaticBorder
+from .quasi_static import critical_horizontal as critical_horizontal
+from .quasi_static import equivalent_angle as equivalent_angle
+from .quasi_static import fold_curve as fold_curve
+from .quasi_static import fold_horizontal as fold_horizontal
+from .quasi_static import is_monostable as is_monostable
+from .quasi_static import quasi_static_border as quasi_static_border
+from .quasi_static import static_angle as static_angle
+from .quasi_static import subcritical_vertical as subcritical_vertical
+from .quasi_static import unloaded_fold as unloaded_fold
+from .restitution import InelasticContact as InelasticContact
+from .restitution import energy_factor as energy_factor
+from .restitution import energy_jump as energy_jump
+from .restitution import inelastic_contact as inelastic_contact
+from .restitution import velocity_factor as velocity_factor
+from .rocking import housner_restitution as housner_restitution
+from .rocking import rocking_energy_decreases as rocking_energy_decreases
+from .rocking import rocking_energy_jump as rocking_energy_jump
+from .rocking import rocking_period as rocking_period
+from .rocking import short_rocking_period as short_rocking_period
+from .rocking import slender_rocking_period as slender_rocking_period
+from .small_vibrations import Vibration as Vibration
+from .small_vibrations import decayed_amplitude as decayed_amplitude
+from .small_vibrations import decayed_period as decayed_period
+from .small_vibrations import final_time as final_time
+from .small_vibrations import linear_period as linear_period
+from .small_vibrations import pendulum_acceleration as pendulum_acceleration
+from .small_vibrations import short_period as short_period
+from .small_vibrations import upright_period as upright_period
+from .small_vibrations import vibrations as vibrations
