@@ -177,14 +177,14 @@ def _codes(motion: Motion) -> np.ndarray:
     codes = motion.events.codes
     if motion.system.model.holds_coordinates:
         return codes
-    return np.column_stack([np.where(codes[:, 0] == EventCode.RESTING, EventCode.HELD, codes[:, 0]), np.ones(len(codes), int)])
+    return np.column_stack([np.where(codes[:, 0] == EventCode.REST, EventCode.HELD, codes[:, 0]), np.ones(len(codes), int)])
 
 
 def impact_speeds(motion: Motion) -> np.ndarray:
     """The least speed at which each impact closes one of its contacts, (n,)."""
     impacts, names = motion.impacts, motion.system.model.coordinates
     if not motion.system.model.holds_coordinates:
-        return np.abs(impacts.velocity_before)
+        return np.asarray(np.abs(impacts.velocity_before))
     speeds = np.full(len(impacts), math.inf)
     for i, contact in enumerate(motion.system.model.contacts):
         rates = np.abs(impacts.velocity_before[:, names.index(contact.coordinate)])

@@ -50,7 +50,7 @@ def section_of(
 def _moves(model: Model, sides: np.ndarray) -> np.ndarray:
     """Whether a motion with these numbers `side` is not held altogether, (n,)."""
     if not model.holds_coordinates:
-        return sides != 0
+        return np.asarray(sides != 0)
     closed, slides = modes_of(model, sides)
     held = sum((closed >> i & 1 for i in range(len(model.contacts))), sum(s == 0 for s in slides))
     return np.asarray(held < len(model.coordinates))
