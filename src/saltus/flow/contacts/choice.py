@@ -1,6 +1,6 @@
 """The decision which of the contacts that are at rest at their positions stay closed.
 
-Its compiled part goes into one module with that of `kernel.py`, whose docstring defines the arguments.
+Its compiled part goes into one module with that of `kernel.py`; the words of `motion` are those of `flow/kernel/memory.py`.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ impact leaves no speed). Contacts of one block that close together have a deriva
 Accumulations of impacts in several blocks that end at one instant are also treated one after the other. Their order makes no
 difference, as no speed is left. At a release nothing jumps, however many contacts open.
 
-Its compiled part goes into one module with that of `kernel.py`, whose docstring defines the arguments.
+Its compiled part goes into one module with that of `kernel.py`; the words of `motion` are those of `flow/kernel/memory.py`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Decisions in the kernel for several contacts: which contacts stay closed, which frictions stick, and where impacts accumulate.
 
-Its compiled part goes into one module with that of `kernel.py`, whose docstring defines the arguments.
+Its compiled part goes into one module with that of `kernel.py`; the words of `motion` are those of `flow/kernel/memory.py`.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ The kernel's array of contacts has a row for each friction behind those of the c
 two guards, its margins (`stick_margins`). The directions are kept in the parameters of `env`, before the numbers that say which
 coordinates are free.
 
-Its compiled part goes into one module with that of `kernel.py`, whose docstring defines the arguments.
+Its compiled part goes into one module with that of `kernel.py`; the words of `motion` are those of `flow/kernel/memory.py`.
 """
 
 from __future__ import annotations

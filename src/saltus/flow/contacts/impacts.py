@@ -1,6 +1,6 @@
 """Impacts of several contacts, and accumulations of them.
 
-Its compiled part goes into one module with that of `kernel.py`, whose docstring defines `contacts`, `model`, `solver`.
+Its compiled part goes into one module with that of `kernel.py`; the words of `motion` are those of `flow/kernel/memory.py`.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ it. The event's map is differentiated there, with the contacts that act. Once it
 the columns are taken back to a fixed time with the velocity and acceleration after the event. Nothing jumps at a simple release,
 so that its saltation is the identity.
 
-Its compiled part goes into one module with that of `kernel.py`, whose docstring defines `contacts`, `model`, `solver`.
+Its compiled part goes into one module with that of `kernel.py`; the words of `motion` are those of `flow/kernel/memory.py`.
 """
 
 from __future__ import annotations

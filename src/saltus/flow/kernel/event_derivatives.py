@@ -151,7 +151,7 @@ def rest_shift(trace: Trace) -> list[Expr]:
     """The shift of the end of an accumulation of impacts, from the state just after one of them, on its side.
 
     The shift of that impact is dt = (x_c - u) / v, and that of its speed dv = z + a dt. The time left is
-    R = 2 w (1/abs(b_s) + e1/abs(b_n)) / (1 - e1 e2), as in `contact.accumulation`. The shift of the rest is therefore
+    R = 2 w (1/abs(b_s) + e1/abs(b_n)) / (1 - e1 e2), as in `accumulation`. The shift of the rest is therefore
     dt + R_v dv + R_t dt + R_c, with the error of R, which is of the order of R^2.
     """
     v, left = Expr("velocity", (), 0), time_left(trace)

@@ -9,7 +9,7 @@ a second module with `contacts/lane_step.py` in the place of `one_contact/lane_s
 A step of all lanes computes the Taylor series; the length of the step in each lane; the end of the step and bounds of the gap, by
 one sweep of Horner's rule; the root in the lanes whose gap certainly has one; and the impacts. If anything else may happen in the
 step of a lane -- rest, slow impacts that may accumulate, a gap that cannot be decided, a limit, a number out of range -- the
-scalar kernel moves this lane from the start of the step on (`scalar_handoff.py`). Lanes do not affect one another, so that
+scalar kernel moves this lane from the start of the step on (`handoff.py`). Lanes do not affect one another, so that
 results depend neither on the width nor on the order.
 
 A step may go past the end of a forcing period. The state there is then evaluated from the step's series (`sampling.pass_ends`),

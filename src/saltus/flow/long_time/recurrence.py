@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 class RecurrenceSettings:
     """When a motion counts as periodic, in orbits, attractors, charts and diagrams."""
 
-    # The compiled lanes look for periods up to this one (`LONGEST_RECURRENCE` in flow/lanes/sampling.py). A motion has settled
+    # The compiled lanes look for periods up to this one (`LONGEST_RECURRENCE` in flow/lanes/memory.py). A motion has settled
     # with the period q if 2 q + 2 successive states agree with those q forcing periods before to within `RECURRENT` (same file):
     # 1e-10 of their size, or of 1 where they are smaller.
     compiled_max_period: int = 16
