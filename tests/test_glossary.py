@@ -18,8 +18,8 @@ PLAIN = """
     advanced approach array ask backward belt box buffer case chain check common compiler computation condition conditioned
     confirmation declared detail difference energy extreme factor failure file find four gain geometry group growth half
     helper inner interrupted judged line linear linked linking loaded location loop mask matching natural neighbour numbered
-    opening origin oscillator outcome peak physical placement pointed raised read reading restart row run sampled searched
-    sequence singular size slow solver source spacing stretched stretching table three timed type until vibration wanted watch
+    opening option origin oscillator outcome peak physical placement pointed raised read reading restart row run sampled searched
+    sequence singular size slow solver source spacing stretch stretched stretching table three timed type until vibration watch
     whole
 """
 PERSONS = "lyapunov mavroeidis newton papageorgiou ricker wada"

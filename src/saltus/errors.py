@@ -12,6 +12,11 @@ LONGEST_NAME, LONGEST_LIST = 80, 200  # the most characters of a name that is co
 class SaltusError(Exception):
     """The base of every error that saltus raises on purpose; the command line prints it as one sentence.
 
+    Parameters
+    ----------
+    message
+        The sentence; a long one is shortened.
+
     Examples
     --------
     >>> issubclass(saltus.ParameterError, saltus.SaltusError)

@@ -9,6 +9,7 @@ import saltus
 from saltus.attractors.along_parameter import attractors_along, set_distance
 from saltus.attractors.attractor import Target
 from saltus.errors import ParameterError
+from saltus.flow import Ending
 from saltus.theory import wall_orbits
 
 
@@ -64,10 +65,10 @@ def test_mirror_images_are_not_exchanged() -> None:
 
 
 def test_the_distance_of_sets_is_hausdorffs_over_their_size() -> None:
-    one = Target(1, "periodic", np.array([[0.0, 0.0], [2.0, 0.0]]))
-    other = Target(1, "periodic", np.array([[0.0, 0.5], [2.0, 0.0], [4.0, 0.0]]))
+    one = Target(1, Ending.PERIODIC, np.array([[0.0, 0.0], [2.0, 0.0]]))
+    other = Target(1, Ending.PERIODIC, np.array([[0.0, 0.5], [2.0, 0.0], [4.0, 0.0]]))
     assert set_distance(one, other) == set_distance(other, one) == pytest.approx(2.0 / 4.0)
-    nothing = Target(0, "rest", np.zeros((1, 2)))
+    nothing = Target(0, Ending.REST, np.zeros((1, 2)))
     assert set_distance(nothing, nothing) == 0.0
 
 

@@ -31,6 +31,6 @@ def test_doctor_names_what_another_package_no_longer_does(saltus, monkeypatch):
     found = saltus("doctor")
     assert found.exit_code == 2
     said = " ".join(found.stderr.split())
-    assert "public functions (lazy_loader): arguments of a wrong kind are not refused" in said
+    assert "public functions (lazy_loader): an unknown argument is not answered with the near ones" in said
     assert "random numbers (NumPy): a seed gives other random numbers" in said
     assert "netCDF files" not in said

@@ -13,6 +13,7 @@ from saltus.flow.kernel import compiled as compilation
 from saltus.flow.kernel.compiled import load_kernel, load_structure
 from saltus.systems import Harmonic, Load, System, WallOscillator
 from saltus.taylor.cache import cache_directory
+from saltus.taylor.generated import functions_text
 from saltus.taylor.tracing import trace
 
 SYSTEM = System(model=WallOscillator(damping=0.1), load=Load(force=-0.125))
@@ -65,7 +66,7 @@ def test_two_processes_that_compile_at_once_succeed_and_a_third_compiles_nothing
     results = [finish(process) for process in pair]
     made = contents(fresh)
     names = {path.name for path in made}
-    assert sum(name.startswith("structure_") and name.endswith(".py") for name in names) == 1
+    assert sum(name.startswith("structure_") and name.endswith(".o") for name in names) == 1
     assert not any(name.endswith(".tmp") for name in names)
     third = finish(start(fresh))
     assert contents(fresh) == made
@@ -104,11 +105,11 @@ def sources(monkeypatch):
     """The texts handed to the compiler, without compiling them."""
     texts = []
 
-    def keep(kind, text):
-        texts.append(text)
+    def keep(kind, functions):
+        texts.append(functions_text(functions))
         raise LookupError
 
-    monkeypatch.setattr(compilation, "load_module", keep)
+    monkeypatch.setattr(compilation, "load_functions", keep)
 
     def of(system, limits=()):
         with pytest.raises(LookupError):

@@ -355,9 +355,9 @@ def test_junk_is_refused_or_taken_but_never_a_traceback_of_another_kind(argument
 
 @FEW
 @given(
-    theta=st.floats(-1e300, 1e300),
-    velocity=st.floats(-1e300, 1e300),
-    amplitude=st.floats(-1e100, 1e100),  # larger ones are refused where they are given
+    theta=st.floats(-1e100, 1e100),  # larger ones are refused where they are given
+    velocity=st.floats(-1e100, 1e100),
+    amplitude=st.floats(-1e100, 1e100),
     damping=st.floats(0, 1e100),
     frequency=st.floats(-5, 5).map(lambda x: 10.0**x),
 )

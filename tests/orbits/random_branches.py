@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 from shared_systems import BETA80, forced, hinged, rocking, shaken, walled
 
-from saltus import Harmonic, Load, Metainterface, Model, SaltusError, System, VelocityReduction, find_orbit
+from saltus import Harmonic, Load, Metainterface, Model, OneContactModel, SaltusError, System, VelocityReduction, find_orbit
 
 FREQUENCY = "load.frequency"
 
@@ -41,12 +41,15 @@ class Duffing(Smooth):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Bilinear(Smooth):
+class Bilinear(OneContactModel):
     """A spring that is stiffer beyond x = `edge`: the field is continuous across the contact."""
 
+    damping: float = 0.1
     edge: float = 0.5
     stiffness: float = 3.0
 
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+    channels: ClassVar[tuple[str, ...]] = ("push",)
     sides: ClassVar[tuple[int, ...]] = (1, -1)
 
     @property
@@ -62,12 +65,15 @@ class Bilinear(Smooth):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ImpactDuffing(Smooth):
+class ImpactDuffing(OneContactModel):
     """Duffing's oscillator with a wall at x = `wall`."""
 
+    damping: float = 0.1
     cubic: float = 1.0
     wall: float = 0.8
 
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+    channels: ClassVar[tuple[str, ...]] = ("push",)
     sides: ClassVar[tuple[int, ...]] = (1,)
 
     @property

@@ -255,7 +255,7 @@ def test_of_special_points_that_crowd_only_some_are_looked_beside(monkeypatch):
     begun = []
     settings = replace(EFFORTS[Effort.QUICK].chaos, beside=(0.0,), spacing=0.1)
     search = BandSearch(DiagramWork(stops(), FORCE), (1.0, 2.0), settings)
-    monkeypatch.setattr(search, "follow", lambda motions: begun.extend(one.value for one in motions))
+    monkeypatch.setattr(search, "simulate_starts", lambda motions: begun.extend(one.value for one in motions))
     search.beside_special_points([BandOrigin("LP", value, (0.0, 0.5)) for value in (1.3, 1.0, 1.05, 1.125)])
     assert begun == [1.0, 1.125, 1.3]
 

@@ -44,8 +44,6 @@ GOOD = {"path": FREQUENCY, "bounds": (0.5, 1.5)}
         ({"starts": "many"}, "starts must be a whole number"),
         ({"effort": "standart"}, "did you mean 'standard'"),
         ({"effort": 3}, "effort knows no"),
-        ({"bands": 121}, "bands must be"),
-        ({"switch": "yes"}, "switch must be"),
         ({"seed": -1}, "seed must lie in"),
         ({"repelling": -1}, "repelling must lie in"),
         ({"step": 0.0}, "step must lie in"),

@@ -10,7 +10,7 @@ from study_cases import FREQUENCY
 from saltus.branch_tables import branches_of
 from saltus.flow import find_recurrence
 from saltus.orbits import continue_orbit, orbits_of, search_orbits
-from saltus.orbits.equations.newton import solve
+from saltus.orbits.orbit import solve
 from saltus.studies import response_spectrum
 from saltus.studies.diagram.diagram_search import MissedShare
 from saltus.studies.diagram.simulated import starts_at

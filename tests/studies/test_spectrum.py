@@ -10,7 +10,7 @@ from study_cases import AMPLITUDE, FREQUENCY
 
 import saltus
 from saltus.orbits import orbits_of
-from saltus.orbits.equations.newton import solve
+from saltus.orbits.orbit import solve
 from saltus.studies import bifurcation_diagram, response_spectrum
 
 TOUCHING = 1e-9  # speed or gap below which an orbit grazes: rounding then decides whether there is an impact

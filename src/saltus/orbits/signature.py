@@ -91,7 +91,13 @@ class Signature:
         return replace(self, sides=sides, events=events, period=self.period if odd else self.period // 2, symmetric=odd)
 
     def over_full_period(self, images: Sequence[int]) -> Signature:
-        """That of a symmetric orbit over its full period; `images` has the number of the image of each contact."""
+        """That of a symmetric orbit over its full period.
+
+        Parameters
+        ----------
+        images
+            The number of the image of each contact.
+        """
         sides = (*self.sides, *(-side for side in self.sides))
         events = (*self.events, *(event.image(images) for event in self.events))
         return replace(self, sides=sides, events=events, symmetric=False)
@@ -101,7 +107,13 @@ class Signature:
         return replace(self, sides=2 * self.sides, events=2 * self.events, period=2 * self.period, symmetric=False)
 
     def part(self, periods: int) -> Signature | None:
-        """That of an orbit of a shorter period which is gone round several times; None if it cannot be."""
+        """That of an orbit of a shorter period which is gone round several times; None if it cannot be.
+
+        Parameters
+        ----------
+        periods
+            Forcing periods of the shorter period.
+        """
         changes = self.sides or self.events
         n = len(changes)
         if self.period % periods or (n * periods) % self.period:

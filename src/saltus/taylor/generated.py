@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from llvmlite import binding, ir
 
 from saltus.taylor import graph, load_tables, machine_code, memory, numba_types, rules, series, sums, tapes, vectors
-from saltus.taylor.cache import digest, kept_bytes, source_of
+from saltus.taylor.cache import digest, kept_bytes, loading, source_of
 from saltus.taylor.graph import LEAVES
 from saltus.taylor.machine_code import Loaded
 from saltus.taylor.memory import Memory, Place, Places
@@ -173,9 +173,10 @@ def llvm_text(functions: Sequence[WrittenFunction]) -> str:
 def load_functions(kind: str, functions: Sequence[WrittenFunction]) -> dict[str, Pointer]:
     """Pointers to functions by their names: loaded from the disk, or written and compiled first."""
     name = f"{kind}_{digest(functions_text(functions), written_by())}"
-    if name not in _loaded:
-        code = kept_bytes(f"{name}.o", lambda: machine_code.object_code(llvm_text(functions)))
-        _loaded[name] = Loaded(code, [function.name for function in functions])
+    with loading:  # a second thread must not load them again: the code that is replaced would be freed while pointers lead to it
+        if name not in _loaded:
+            code = kept_bytes(f"{name}.o", lambda: machine_code.object_code(llvm_text(functions)))
+            _loaded[name] = Loaded(code, [function.name for function in functions])
     addresses = _loaded[name].addresses
     return {each.name: Pointer.to(addresses[each.name], written_type(each.signature)) for each in functions}
 

@@ -102,15 +102,30 @@ _sharing: list[Callable[[], int]] = [lambda: 1]  # how many processes share the 
 
 
 def share_cores(processes: Callable[[], int]) -> None:
-    """Let this process use only its share of the cores, as other processes compute at the same time; `processes` counts them.
+    """Let this process use only its share of the cores, as other processes compute at the same time.
 
     More threads than cores would only split small ensembles further, and more lanes would stand empty at the end.
+
+    Parameters
+    ----------
+    processes
+        Counts the processes that compute at the same time, this one included, whenever it is called.
+
+    Examples
+    --------
+    >>> saltus.flow.share_cores(lambda: 1)  # this process alone
     """
     _sharing[:] = [processes]
 
 
 def available_cores() -> int:
-    """The number of cores that this process may use, or its share of them (`share_cores`)."""
+    """The number of cores that this process may use, or its share of them (`share_cores`).
+
+    Examples
+    --------
+    >>> saltus.flow.available_cores() >= 1
+    True
+    """
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return max(1, cores // max(1, _sharing[0]()))
 

@@ -120,7 +120,7 @@ def solution_columns(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
     sections = np.array([np.nan if orbit.signature.section is None else orbit.signature.section for orbit in orbits])
     return data | {
         "section": ("point", sections),
-        "events": (("point", "event", "mark"), events),
+        "events": (("point", "event_mark"), events.reshape(len(orbits), -1)),
         "closed_contacts": ("point", closed),
     }
 

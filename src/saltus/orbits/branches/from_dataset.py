@@ -66,7 +66,10 @@ def _signatures(dataset: xarray.Dataset) -> list[Signature]:
     """The signature of each orbit."""
     columns = (dataset[name].values for name in ("sides", "period", "symmetric", "side"))
     signatures = [_signature(*row) for row in zip(*columns, strict=True)]
-    changes = [tuple(ModeChange(bool(k), int(i), int(c)) for k, i, c in table if k >= 0) for table in dataset["events"].values]
+    changes = [
+        tuple(ModeChange(bool(k), int(i), int(c)) for k, i, c in table.reshape(-1, 3) if k >= 0)
+        for table in dataset["events"].values
+    ]
     more = zip(signatures, changes, dataset["closed_contacts"].values, dataset["section"].values, strict=True)
     return [
         replace(signature, events=events, closed=int(closed), section=None if np.isnan(section) else float(section))
@@ -83,7 +86,7 @@ def _orbit(equations: OrbitEquations, row: np.ndarray, value: np.ndarray) -> Per
     values = value.astype(float)
     orbit = PeriodicOrbit.known(equations, row[: equations.size].copy(), values)
     scale = max(1.0, float(np.abs(row[: equations.size]).max()))
-    if orbit is None or not orbit.residual <= NEWTON.stalled * scale:
+    if orbit is None or not orbit.residual <= max(NEWTON.stalled * scale, equations.residual_floor):
         error = "its motion cannot be followed" if orbit is None else f"its residual is {orbit.residual:.1e}"
         raise ParameterError(f"what is kept at {equations.paths[0]} = {values[0]:g} is no orbit ({error}): the data are damaged")
     return orbit
