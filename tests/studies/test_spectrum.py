@@ -103,7 +103,7 @@ def test_every_point_repeats_itself_as_well_as_it_repels(branches):
 
 def test_stable_means_multipliers_inside_the_unit_circle(branches):
     for branch in branches:
-        inside = (largest_multiplier(branch) < 1.0) & ~touches(branch)
+        inside = (largest_multiplier(branch) < 1.0 - 1e-9) & ~touches(branch)  # exactly at a special point it is not stable
         assert (branch["stable"].values.astype(bool) == inside).all()
 
 
