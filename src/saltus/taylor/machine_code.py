@@ -20,6 +20,7 @@ from saltus.errors import SaltusError
 
 # As numba, and for the whole of LLVM: its passes are not safe to run from two threads of one target machine.
 _LLVM = threading.RLock()
+_ENGINES: list[Any] = []  # All code stays in memory as long as the process: pointers to it may be anywhere.
 
 
 def check_environment() -> None:
@@ -91,7 +92,7 @@ def _optimise(module: Any, machine: Any) -> None:
 
 
 class Loaded:
-    """The functions of an object file in memory, as long as this object lives.
+    """The functions of an object file in memory, where they stay as long as the process.
 
     Attributes
     ----------
@@ -104,4 +105,5 @@ class Loaded:
             self._engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _target_machine())
             self._engine.add_object_file(binding.ObjectFileRef.from_data(code))
             self._engine.finalize_object()
+            _ENGINES.append(self._engine)
             self.addresses: dict[str, int] = {name: self._engine.get_function_address(name) for name in names}
