@@ -1,4 +1,4 @@
-"""The compiled code with which one motion is followed: one kernel for all models, and the functions of each structure."""
+"""The compiled code with which one motion is followed: a kernel for each kind of model, and the functions of each structure."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def _load_fillers() -> tuple[Callable[..., None], Callable[..., None]]:
 
 @cache
 def load_kernel() -> Callable[..., int]:
-    """The kernel that advances every model, `advance` of `one_contact/kernel.py`, called without numba's dispatch on argument
+    """The kernel of models with at most one contact, `advance` of `kernel/loop.py`, called without numba's dispatch on argument
     types."""
     return entry_point(kernel_module().advance)
 

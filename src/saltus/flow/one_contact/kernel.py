@@ -1,8 +1,8 @@
 """The scalar flow of one motion: arcs, impacts, rest and release, accumulations of impacts, chatter.
 
 The compiled parts of `kernel/layout.py`, `kernel/roots.py`, `kernel/steps.py`, `impacts.py`, this file and `kernel/loop.py`,
-which calls it, are compiled as one module, once for all models: the functions that are generated for a structure (see
-`kernel/compiled.py`) are in its memory. These files therefore consist of plain loops under the decorators of `saltus.taylor`, and
+which calls it, are compiled as one module, once for all models with at most one contact: the functions that are generated for a
+structure (see `kernel/compiled.py`) are in its memory. These files therefore consist of plain loops under the decorators of `saltus.taylor`, and
 share one namespace. All of a motion's memory is in `motion` (see `kernel/memory.py`).
 
 A motion is in one of the modes of `Mode`. If a tangent is asked for (see `kernel/event_derivatives.py`), its columns are further
