@@ -86,8 +86,9 @@ class Harmonic(Signal):
 
     def __post_init__(self) -> None:
         settle_numbers(self, "amplitude", "mean", "phase")
-        if isinstance(self.order, float) and self.order.is_integer():  # from a column of numbers
-            object.__setattr__(self, "order", int(self.order))
+        order: Any = self.order
+        if isinstance(order, float) and order.is_integer():  # from a column of numbers
+            object.__setattr__(self, "order", int(order))
         check_count("order", self.order, 1)
 
     def derivative(self, t: Any, frequency: Any, order: int = 0) -> Any:
