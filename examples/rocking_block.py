@@ -13,7 +13,7 @@ import saltus
 from saltus import theory
 
 alpha = 0.25
-block = saltus.System(model=saltus.RockingBlock(alpha=alpha))
+block = saltus.System(model=saltus.RockingBlock(alpha=alpha), impact=saltus.VelocityReduction(1.0))  # nothing is lost
 tilts = alpha * np.array([0.1, 0.3, 0.5, 0.7, 0.9, 0.99])
 periods = []
 for tilt in tilts:

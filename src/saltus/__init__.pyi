@@ -80,6 +80,7 @@ from .systems import NewtonImpact as NewtonImpact
 from .systems import OneContactModel as OneContactModel
 from .systems import OneCosine as OneCosine
 from .systems import OneSine as OneSine
+from .systems import PhysicalBlock as PhysicalBlock
 from .systems import PhysicalCell as PhysicalCell
 from .systems import Ramp as Ramp
 from .systems import Record as Record

@@ -7,7 +7,7 @@ from shared_systems import forced
 import saltus
 from saltus.flow import RECURRENCE, Ending, find_recurrence, load_releases, nearest_return, return_distances, return_period
 from saltus.flow.long_time.recurrence import _long_period
-from saltus.systems import Harmonic, Load, RockingBlock, System
+from saltus.systems import Harmonic, Load, RockingBlock, System, VelocityReduction
 
 STATES = np.random.default_rng(1).uniform(-1.5, 1.5, (32, 2))
 AMPLITUDE = "load.horizontal.amplitude"
@@ -74,7 +74,7 @@ def test_motions_that_come_to_rest_have_no_extrema_unless_they_are_recorded_from
 
 def test_extrema_of_a_motion_that_a_limit_ends_are_those_before_its_end():
     load = Load(frequency=4.0, ground_horizontal=Harmonic(0.05))
-    system = System(model=RockingBlock(alpha=0.3), load=load)
+    system = System(model=RockingBlock(alpha=0.3), load=load, impact=VelocityReduction(1.0))
     states = np.random.default_rng(1).uniform(-0.1, 0.1, (4, 2))
     ends = find_recurrence(system, states, 60, kept=3, max_period=2, extrema=True)
     assert ends.ended.all()

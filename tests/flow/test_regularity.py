@@ -80,7 +80,7 @@ def metainterface(e=1.0, **load):
         (metainterface(0.9, horizontal=Harmonic(0.5)), IMPACT),
         (walled(), IMPACT),
         (rocking(), IMPACT if rocking().impact != VelocityReduction(1.0) else JUMP),
-        (System(model=RockingBlock(alpha=0.2)), JUMP),
+        (System(model=RockingBlock(alpha=0.2), impact=VelocityReduction(1.0)), JUMP),
         (System(model=Metainterface(beta0=1.4, smoothing=50.0)), CONTINUOUS),  # without a contact
         (System(model=Metainterface(beta0=1.4), impact=EnergyRestitution(1.0)), IMPACT),  # the identity, but not provably
     ],

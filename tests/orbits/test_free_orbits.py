@@ -35,7 +35,7 @@ def test_the_free_period_of_a_slender_block_is_housners():
 
 
 def test_the_free_period_of_a_rigid_block_is_the_elliptic_integral():
-    system = System(model=saltus.RockingBlock(alpha=0.3))
+    system = System(model=saltus.RockingBlock(alpha=0.3), impact=saltus.VelocityReduction(1.0))
     angles = np.array([0.001, 0.1, 0.25, 0.29])
     assert backbone(system, angles).period.values == pytest.approx(theory.rocking_period(angles, alpha=0.3), rel=1e-11)
 
@@ -95,7 +95,7 @@ def test_between_a_wall_and_a_spring():
 
 
 def test_one_free_orbit_is_a_motion_that_comes_back():
-    orbit = free_orbit(System(model=saltus.RockingBlock(alpha=0.3)), 0.1)
+    orbit = free_orbit(System(model=saltus.RockingBlock(alpha=0.3), impact=saltus.VelocityReduction(1.0)), 0.1)
     motion = orbit.motion()
     assert (motion.theta, motion.velocity) == pytest.approx((0.1, 0.0), abs=1e-12)
     assert len(motion.impacts) == 2
@@ -106,7 +106,7 @@ def test_what_has_no_free_orbit_is_told():
     unforced = saltus.Load(vertical=-0.5)
     damped = System(model=saltus.Metainterface(beta0=1.4, damping=0.1), load=unforced)
     inelastic = System(model=saltus.Metainterface(beta0=1.4), load=unforced, impact=saltus.VelocityReduction(0.8))
-    block = System(model=saltus.RockingBlock(alpha=0.3))
+    block = System(model=saltus.RockingBlock(alpha=0.3), impact=saltus.VelocityReduction(1.0))
     for system, start, outcome in (
         (damped, 0.4, "lost"),
         (inelastic, 0.4, "lost"),
@@ -124,7 +124,7 @@ def test_what_has_no_free_orbit_is_told():
 
 
 def test_the_picture_of_a_backbone_has_frequencies_and_amplitudes():
-    data = backbone(System(model=saltus.RockingBlock(alpha=0.3)), [0.05, 0.1, 0.2, 0.35])
+    data = backbone(System(model=saltus.RockingBlock(alpha=0.3), impact=saltus.VelocityReduction(1.0)), [0.05, 0.1, 0.2, 0.35])
     (ax,) = figure_of(draw_backbone(data)).axes
     (line,) = ax.lines
     assert line.get_xdata()[:3] == pytest.approx(data.frequency.values[:3])

@@ -92,7 +92,7 @@ def test_between_two_walls_what_the_load_gives_is_dissipated():
 
 
 def test_a_free_orbit_dissipates_nothing():
-    block = saltus.System(model=saltus.RockingBlock(alpha=0.3))
+    block = saltus.System(model=saltus.RockingBlock(alpha=0.3), impact=saltus.VelocityReduction(1.0))
     assert mean_dissipated_power(free_orbit(block, 0.1)) == pytest.approx(0.0, abs=1e-15)
 
 

@@ -7,9 +7,25 @@ import pytest
 import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 
+import saltus
 from saltus.errors import ParameterError
-from saltus.systems import Harmonic, Load, Metainterface, PhysicalCell, Record, TwoLayer, UnitCell
+from saltus.systems import (
+    HalfSine,
+    Harmonic,
+    InelasticImpact,
+    Load,
+    Metainterface,
+    PhysicalBlock,
+    PhysicalCell,
+    Record,
+    RockingBlock,
+    System,
+    TwoLayer,
+    UnitCell,
+    VelocityReduction,
+)
 
 positive = st.floats(1e-3, 1e3)
 physical_cells = st.builds(
@@ -148,3 +164,58 @@ def test_the_model_moves_as_the_cell_does_in_si():
 def test_impossible_data_are_refused(change, message):
     with pytest.raises(ParameterError, match=message):
         PhysicalCell(**{"length": 0.1, "upper_mass": 0.2, "upper_stiffness": 3.0, **change})
+
+
+BLOCK = PhysicalBlock(half_width=0.4, half_height=1.6, gravity=9.81)
+
+
+def test_a_block_in_si_units_moves_as_the_equation_of_its_angular_momentum():
+    """(4/3) R^2 theta'' = -g R sin(s alpha - theta) - a R cos(s alpha - theta) in seconds, by DOP853, with Housner's loss."""
+    pulse = HalfSine(amplitude=4.0, frequency=5.0, quantity="acceleration", start=0.2)
+    system = BLOCK.system(Load(ground_horizontal=pulse))
+    motion = saltus.simulate(system, theta=0.0, duration=3.0 * BLOCK.frequency)
+    radius, alpha = math.hypot(0.4, 1.6), math.atan2(0.4, 1.6)
+
+    def ground(t):
+        return 4.0 * math.sin(5.0 * (t - 0.2)) if 0.2 <= t <= 0.2 + math.pi / 5.0 else 0.0
+
+    def rates(t, state):
+        lean = side * alpha - state[0]
+        return [state[1], -0.75 / radius * (9.81 * math.sin(lean) + ground(t) * math.cos(lean))]
+
+    def contact(t, state):
+        return state[0] if t > begin + 1e-6 else side
+
+    # it leaves the ground where a = g tan(alpha), on the side away from the acceleration
+    begin, side, state, times = 0.2 + math.asin(9.81 * math.tan(alpha) / 4.0) / 5.0, -1, [0.0, 0.0], []
+    for end in (0.2 + math.pi / 5.0, 3.0, 3.0):
+        contact.terminal = True
+        found = solve_ivp(rates, (begin, end), state, "DOP853", rtol=1e-12, atol=1e-13, events=contact, max_step=0.01)
+        begin, state = found.t[-1], found.y[:, -1]
+        if found.status == 1:
+            times.append(begin)
+            state, side = [0.0, state[1] * (1.0 - 1.5 * math.sin(alpha) ** 2)], -side
+    assert len(times) >= 1
+    assert motion.impacts.time[: len(times)] / BLOCK.frequency == pytest.approx(times, abs=1e-8)
+    assert system.impact == InelasticImpact()
+
+
+def test_a_load_of_a_block_comes_back_from_its_dimensionless_form():
+    record = Record([0.0, 0.1, 0.3], [0.0, 2.0, 0.0], quantity="acceleration")
+    si = Load(frequency=3.0, ground_horizontal=[record, Harmonic(0.02)], ground_vertical=record)
+    back = BLOCK.load_in_si(BLOCK.load(si))
+    assert back.frequency == pytest.approx(3.0)
+    for t in (0.05, 0.2):
+        assert back.ground_horizontal.acceleration(t) == pytest.approx(si.ground_horizontal.acceleration(t))
+    assert BLOCK.load(si).ground_vertical.acceleration(0.1 * BLOCK.frequency) == pytest.approx(2.0 / 9.81)  # 1 is the gravity
+    with pytest.raises(ParameterError, match=r"PhysicalBlock has no unit of force for load.horizontal"):
+        BLOCK.load(Load(horizontal=1.0))
+
+
+def test_a_block_loses_what_housner_says_unless_it_is_told_otherwise():
+    alpha = BLOCK.alpha
+    impacts = saltus.simulate(System(model=RockingBlock(alpha=alpha)), theta=0.5 * alpha, duration=10.0).impacts
+    kept = impacts.velocity_after / impacts.velocity_before
+    assert kept == pytest.approx(np.full(len(impacts), math.sqrt(saltus.theory.housner_restitution(alpha))))
+    free = BLOCK.system(Load(), impact=VelocityReduction(1.0))
+    assert free.impact == VelocityReduction(1.0) == System(model=Metainterface(beta0=1.4)).impact

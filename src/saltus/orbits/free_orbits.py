@@ -72,7 +72,7 @@ class FreeOrbit(Result):
 
     Examples
     --------
-    >>> free = saltus.System(model=saltus.RockingBlock(alpha=0.25))
+    >>> free = saltus.System(model=saltus.RockingBlock(alpha=0.25), impact=saltus.VelocityReduction(1.0))
     >>> orbit = saltus.free_orbit(free, 0.1)
     >>> bool(abs(orbit.period - saltus.theory.rocking_period(0.1, alpha=0.25)) < 1e-10)
     True
@@ -165,7 +165,8 @@ def backbone(system: System, amplitudes: Iterable[float], *, progress: Progress 
 
     Examples
     --------
-    >>> line = saltus.backbone(saltus.System(model=saltus.RockingBlock(alpha=0.25)), [0.05, 0.1, 0.2])
+    >>> free = saltus.System(model=saltus.RockingBlock(alpha=0.25), impact=saltus.VelocityReduction(1.0))
+    >>> line = saltus.backbone(free, [0.05, 0.1, 0.2])
     >>> bool(np.allclose(line.period, saltus.theory.rocking_period([0.05, 0.1, 0.2], alpha=0.25)))
     True
     """

@@ -60,6 +60,7 @@ from .scenarios import name_impact as name_impact
 from .scenarios import other_impulse as other_impulse
 from .scenarios import table_1 as table_1
 from .serial import signal_class as signal_class
+from .si_units import PhysicalBlock as PhysicalBlock
 from .si_units import PhysicalCell as PhysicalCell
 from .signals import Constant as Constant
 from .signals import Harmonic as Harmonic

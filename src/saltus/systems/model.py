@@ -66,6 +66,7 @@ class Model:
     stops: ClassVar[tuple[str, ...]] = ()
     singularity: ClassVar[str] = ""  # a name for the states in which the acceleration is infinite, if there are such
     damping: float = 0.0  # small vibrations decay as exp(-damping tau / 2)
+    usual_impact: ClassVar[Any] = None  # the impact law of a `System` that is given none; None keeps the velocity
 
     def unit_of(self, coordinate: str) -> str:
         """The unit of one of the coordinates, such as "rad".

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from saltus.checks import RADIANS, settle_numbers
+from saltus.systems.impact_laws import ImpactLaw, InelasticImpact
 from saltus.systems.load import Load, reversed_load
 from saltus.systems.model import MarginKind, OneContactModel
 
@@ -24,6 +25,9 @@ class RockingBlock(OneContactModel):
     The block is assumed to stay on the ground: for nu'' < -1 it would leave it, which is not checked.
     A motion stops, `overturned`, when the block lies on its side: pi/2 - abs(theta) = 0.
 
+    A system that is given no impact law has Housner's loss, `InelasticImpact`: each impact keeps 1 - (3/2) sin(alpha)^2 of the
+    velocity. `PhysicalBlock` makes the block and its loads from SI units.
+
     Parameters
     ----------
     alpha
@@ -31,7 +35,7 @@ class RockingBlock(OneContactModel):
 
     Examples
     --------
-    >>> block = saltus.System(model=saltus.RockingBlock(alpha=0.25))
+    >>> block = saltus.System(model=saltus.RockingBlock(alpha=0.25), impact=saltus.VelocityReduction(1.0))  # without a loss
     >>> motion = saltus.simulate(block, theta=0.1, duration=10.0)
     >>> period = motion.impacts.time[2] - motion.impacts.time[0]
     >>> float(period / saltus.theory.rocking_period(0.1, alpha=0.25))
@@ -44,6 +48,7 @@ class RockingBlock(OneContactModel):
     channels: ClassVar[tuple[str, ...]] = ("ground_horizontal", "ground_vertical")
     margin_kinds: ClassVar[dict[str, MarginKind]] = {"overturned": MarginKind.LIMIT}
     stops: ClassVar[tuple[str, ...]] = ("overturned",)
+    usual_impact: ClassVar[ImpactLaw] = InelasticImpact()
 
     def __post_init__(self) -> None:
         settle_numbers(self, "alpha", above=0.0, below=math.pi / 2)

@@ -1,4 +1,4 @@
-"""SI data of a cell, and the dimensionless numbers that follow from them (paper, `timeT` to `displ_ratio1`, `dim_less`)."""
+"""SI data of a cell or a block, and the dimensionless numbers that follow (paper, `timeT` to `displ_ratio1`, `dim_less`)."""
 
 from __future__ import annotations
 
@@ -10,15 +10,72 @@ from typing import Any
 
 from saltus.checks import check_number, settle_numbers
 from saltus.errors import ParameterError
+from saltus.systems.impact_laws import ImpactLaw
 from saltus.systems.load import Load
 from saltus.systems.metainterface import Metainterface
 from saltus.systems.pulses import Pulse, in_other_units
+from saltus.systems.rocking_block import RockingBlock
 from saltus.systems.signals import Record, Signal, Sum, scaled
+from saltus.systems.system import System
 from saltus.systems.two_layer import TwoLayer
 
 
+class Physical:
+    """Loads in SI units, made dimensionless by `units`, and back."""
+
+    __slots__ = ()
+
+    @property
+    def units(self) -> dict[str, float]:
+        """The SI value of 1 of each dimensionless quantity."""
+        raise NotImplementedError
+
+    def load(self, si: Load) -> Load:
+        """The dimensionless form of a load in SI units: rad/s, N, and for the ground m, m/s or m/s^2; times of records in s.
+
+        Parameters
+        ----------
+        si
+            A load in SI units.
+        """
+        return self._convert(si, truediv, mul, -1)
+
+    def load_in_si(self, load: Load) -> Load:
+        """The inverse of `load`.
+
+        Parameters
+        ----------
+        load
+            A dimensionless load.
+        """
+        return self._convert(load, mul, truediv, 1)
+
+    def _convert(self, load: Load, by_time: Callable[..., Any], by_rate: Callable[..., Any], power: int) -> Load:
+        """The load with times and rates converted by the unit of time, and values multiplied by the `power` of their unit."""
+        units = self.units
+        forces = [name for name in load.channels if not name.startswith("ground_")]
+        if forces and "force" not in units:
+            raise ParameterError(f"a {type(self).__name__} has no unit of force for load.{forces[0]}", f"load.{forces[0]}")
+
+        def convert(signal: Signal, quantity: str) -> Signal:
+            if isinstance(signal, Sum):
+                return Sum(tuple(convert(term, quantity) for term in signal.terms))
+            if isinstance(signal, Record):
+                scale = signal.scale * units[signal.quantity] ** power
+                return Record(by_time(signal.time, units["time"]), signal.value, signal.quantity, scale, signal.source)
+            if isinstance(signal, Pulse):
+                return in_other_units(signal, by_time, by_rate, units["time"], units[signal.quantity] ** power)
+            return scaled(signal, units[quantity] ** power)
+
+        channels = {
+            name: convert(signal, "displacement" if name.startswith("ground_") else "force")
+            for name, signal in load.channels.items()
+        }
+        return Load(frequency=None if load.frequency is None else by_rate(load.frequency, units["time"]), **channels)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PhysicalCell:
+class PhysicalCell(Physical):
     """Length, masses, rotational stiffnesses and dampings of a cell in SI units; layer 1 is the lower one, 2 the upper one.
 
     The characteristic time is T = sqrt(M2 l^2 / K2) (`timeT`), so that tau = t / T; forces are H l / K2 (`dim_less`), ground
@@ -152,42 +209,92 @@ class PhysicalCell:
         """
         return TwoLayer(beta0=beta0, **self.ratios)
 
-    def load(self, si: Load) -> Load:
-        """The dimensionless form of a load in SI units: rad/s, N, and for the ground m, m/s or m/s^2; times of records in s.
+
+GRAVITY = 9.80665  # m/s^2, the standard value, which also makes the g of a record
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PhysicalBlock(Physical):
+    """Width, height and gravity of a rigid rocking block in SI units; half of each, so that its half diagonal is R.
+
+    The block has the slenderness tan(alpha) = b / h and the frequency p = sqrt(3 g / (4 R)), so that tau = p t; a ground motion
+    is zeta = 3 U / (4 R), which makes 1 of a dimensionless acceleration the gravity g: the block begins to rock at tan(alpha).
+
+    Parameters
+    ----------
+    half_width
+        b, m.
+    half_height
+        h, m.
+    gravity
+        g, m/s^2.
+
+    Raises
+    ------
+    ParameterError
+        A value that is not above 0.
+
+    Examples
+    --------
+    >>> block = saltus.PhysicalBlock(half_width=0.3, half_height=1.5)
+    >>> round(block.frequency, 4), round(block.alpha, 4)
+    (2.1927, 0.1974)
+    >>> pulse = saltus.HalfSine(amplitude=3.0, frequency=2 * np.pi, quantity="acceleration")  # m/s^2, rad/s
+    >>> system = block.system(saltus.Load(ground_horizontal=pulse))  # with Housner's loss at impacts
+    >>> motion = saltus.simulate(system, theta=0.0, duration=10.0 * block.frequency)  # 10 s
+    >>> str(motion.stop), round(motion.impacts.time[0] / block.frequency, 4)
+    ('rest', 0.8)
+    """
+
+    half_width: float
+    half_height: float
+    gravity: float = GRAVITY
+
+    def __post_init__(self) -> None:
+        settle_numbers(self, "half_width", "half_height", "gravity", above=0.0)
+
+    @property
+    def half_diagonal(self) -> float:
+        """R = sqrt(b^2 + h^2), m."""
+        return math.hypot(self.half_width, self.half_height)
+
+    @property
+    def alpha(self) -> float:
+        """The slenderness angle arctan(b / h), rad."""
+        return math.atan2(self.half_width, self.half_height)
+
+    @property
+    def frequency(self) -> float:
+        """p = sqrt(3 g / (4 R)), rad/s."""
+        return math.sqrt(0.75 * self.gravity / self.half_diagonal)
+
+    @property
+    def units(self) -> dict[str, float]:
+        """The SI value of 1 of each dimensionless quantity: tau = t / units["time"], zeta = U / units["displacement"] and so on.
+
+        1 / p, p, 4 R / 3 and its rates, of which the acceleration is g.
+        """
+        length = 4.0 * self.half_diagonal / 3.0
+        return {
+            "time": 1.0 / self.frequency,
+            "frequency": self.frequency,
+            "displacement": length,
+            "velocity": length * self.frequency,
+            "acceleration": self.gravity,
+        }
+
+    def rocking_block(self) -> RockingBlock:
+        """The model of this block."""
+        return RockingBlock(alpha=self.alpha)
+
+    def system(self, si: Load, impact: ImpactLaw | None = None) -> System:
+        """The dimensionless system of this block under a load in SI units.
 
         Parameters
         ----------
         si
-            A load in SI units.
+            A load in SI units, as `load` takes it.
+        impact
+            The impact law; by default Housner's, `InelasticImpact`.
         """
-        return self._convert(si, truediv, mul, -1)
-
-    def load_in_si(self, load: Load) -> Load:
-        """The inverse of `load`.
-
-        Parameters
-        ----------
-        load
-            A dimensionless load.
-        """
-        return self._convert(load, mul, truediv, 1)
-
-    def _convert(self, load: Load, by_time: Callable[..., Any], by_rate: Callable[..., Any], power: int) -> Load:
-        """The load with times and rates converted by the unit of time, and values multiplied by the `power` of their unit."""
-        units = self.units
-
-        def convert(signal: Signal, quantity: str) -> Signal:
-            if isinstance(signal, Sum):
-                return Sum(tuple(convert(term, quantity) for term in signal.terms))
-            if isinstance(signal, Record):
-                scale = signal.scale * units[signal.quantity] ** power
-                return Record(by_time(signal.time, units["time"]), signal.value, signal.quantity, scale, signal.source)
-            if isinstance(signal, Pulse):
-                return in_other_units(signal, by_time, by_rate, units["time"], units[signal.quantity] ** power)
-            return scaled(signal, units[quantity] ** power)
-
-        channels = {
-            name: convert(signal, "displacement" if name.startswith("ground_") else "force")
-            for name, signal in load.channels.items()
-        }
-        return Load(frequency=None if load.frequency is None else by_rate(load.frequency, units["time"]), **channels)
+        return System(model=self.rocking_block(), load=self.load(si), impact=impact or RockingBlock.usual_impact)

@@ -34,7 +34,8 @@ class System:
     load
         The load that acts on it; by default none.
     impact
-        The impact law; by default the velocity is kept (e = 1).
+        The impact law; by default the model's `usual_impact`, which is Housner's for a rocking block, and else the velocity is
+        kept (e = 1).
 
     Raises
     ------
@@ -51,9 +52,11 @@ class System:
 
     model: Model
     load: Load = field(default_factory=Load)
-    impact: ImpactLaw = field(default_factory=VelocityReduction)
+    impact: ImpactLaw = None  # type: ignore[assignment]  # until `__post_init__`, which knows the model
 
     def __post_init__(self) -> None:
+        if self.impact is None:
+            object.__setattr__(self, "impact", getattr(self.model, "usual_impact", None) or VelocityReduction())
         _check_parts(self)
         for channel in self.load.channels:
             if channel not in self.model.channels:
