@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import saltus
+from saltus.bounds import proved_speeds
 from saltus.cli.summaries import summarise
 from saltus.config import load_study
 from saltus.errors import ParameterError
@@ -70,6 +71,15 @@ def test_without_impacts_both_ways_are_the_linear_response(swept):
         free = one.impact_count == 0
         assert one.amplitude[free].values == pytest.approx(FORCE * linear_gain(one.value[free].values), rel=1e-8)
         assert free.sum() > 15
+
+
+def test_the_speeds_of_capture_of_all_values_are_proved_together(monkeypatch):
+    """One proof takes as long for one value as for a hundred; without a jump two ways of 12 values need three."""
+    proofs = []
+    monkeypatch.setattr("saltus.bounds.proved_speeds", lambda *given: proofs.append(0) or proved_speeds(*given))
+    data = saltus.frequency_sweep(oscillator(), np.linspace(1.2, 1.25, 12), x=0.1)
+    assert data.sizes["jump"] == 0
+    assert 0 < len(proofs) <= 3
 
 
 def test_any_parameter_of_the_load_is_swept():
