@@ -165,7 +165,7 @@ def contact_arc(motion, target):
     if hit >= 0 and motion.contacts[hit, ContactColumn.CLOSED] == 0:
         bits = together(motion, hit, tau)
     finite = move(motion, tau)
-    for i in range(motion.own):
+    for i in range(motion.dof):
         for k in range(motion.order + 2, order + 2):
             motion.coordinate_series[i, k] = 0.0
     motion.order = order

@@ -177,14 +177,15 @@ def column_step(motion):
 
 @lean_jit
 def record_step(motion, side, t, h):
-    """Append a step of the dense output: its start, its length, and the coordinates' series."""
+    """Append a step of the dense output: its start, its length, and the series of as many coordinates as the buffer has rows for:
+    the model's own, or those of the tangent's columns too."""
     if motion.dense == 0:
         return
     labels, spans, coefficients = motion.step_labels, motion.step_spans, motion.step_series
     i = motion.recorded_steps
     labels[i, 0], labels[i, 1] = motion.period, side
     spans[i, 0], spans[i, 1] = t, h
-    for d in range(motion.own):
+    for d in range(coefficients.shape[1]):
         for k in range(motion.order + 2):
             coefficients[i, d, k] = motion.coordinate_series[d, k]
     motion.recorded_steps = i + 1

@@ -41,7 +41,8 @@ class Recorder:
     def __init__(self, request: MotionRequest, order: int, columns: int) -> None:
         kept = request.dense or request.sample_times is not None
         dof, size = len(request.system.model.coordinates), MOST.buffer if kept else 8
-        self.steps = StepBuffers(np.empty((size, 2), dtype=np.int64), np.empty((size, 2)), np.empty((size, dof, order + 2)))
+        self._own, rows = dof, dof * (1 + columns) if request.dense and request.sample_times is None else dof
+        self.steps = StepBuffers(np.empty((size, 2), dtype=np.int64), np.empty((size, 2)), np.empty((size, rows, order + 2)))
         model = request.system.model
         self._contacts = [contact.name for contact in model.contacts]
         self._frictions = [friction.name for friction in model.frictions]
@@ -116,12 +117,15 @@ class Recorder:
         """The shift of each event along each column of the tangent, (events, columns); nan where it is not known."""
         return np.concatenate([values[:, self._width :] for _, values in self._events])
 
-    def dense(self) -> DenseOutput | None:
-        """The whole dense output, or None if it was not kept."""
+    def dense(self) -> tuple[DenseOutput | None, DenseOutput | None]:
+        """The dense output of the motion, and of its columns, the coordinates of one after those of the other; None
+        if it was not kept."""
         if self._times is not None or not self._pieces:
-            return None
+            return None, None
         fields = ("start", "length", "side", "series")
-        return DenseOutput(*(np.concatenate([getattr(piece, name) for piece in self._pieces]) for name in fields))
+        start, length, side, series = (np.concatenate([getattr(piece, name) for piece in self._pieces]) for name in fields)
+        own, columns = series[:, : self._own], series[:, self._own :]
+        return DenseOutput(start, length, side, own), DenseOutput(start, length, side, columns) if columns.size else None
 
     def samples(self, end: float, position: np.ndarray, velocity: np.ndarray, side: int) -> Samples | None:
         """The states at the sample times up to the end, for which the given state is used; None if no samples were asked for."""

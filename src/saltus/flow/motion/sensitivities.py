@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_names
+from saltus.checks import check_names, instants
 from saltus.flow.contacts.layout import ImpactDetail
 from saltus.flow.kernel.layout import GrazingDetail
 from saltus.flow.kernel.memory_layout import RestDetail
@@ -18,6 +18,7 @@ from saltus.flow.motion.events import EventKind, Stop
 from saltus.flow.motion.motion import Motion, state_names
 from saltus.flow.motion.request import MotionRequest
 from saltus.flow.motion.simulate import Followed, follow
+from saltus.flow.motion.validity import DenseOutput
 from saltus.progress import Progress, silent
 from saltus.public_functions import Numbers
 from saltus.result import Result, result_dataset
@@ -70,6 +71,10 @@ class Sensitivities(Result):
         The times at which the motion touches the contact; motions that pass on the other side have other derivatives.
     undefined
         Why some or all derivatives at the end do not exist; these are nan.
+    tangent
+        The Taylor series of the derivatives along the motion, from which `at` evaluates them; None where they were not kept.
+    at_end
+        The derivatives at the end at a fixed time, (2 n, 2 n + parameters).
 
     Examples
     --------
@@ -85,6 +90,49 @@ class Sensitivities(Result):
     event_times: np.ndarray
     grazings: np.ndarray
     undefined: str | None
+    tangent: DenseOutput | None
+    at_end: np.ndarray
+
+    def at(self, times: Numbers) -> np.ndarray:
+        """The derivatives of the state at any times of the motion, at fixed times and to its accuracy; at an impact, those
+        just after it.
+
+        They jump at impacts with the state. Just before one they are those of the last number below its time,
+        `np.nextafter(time, -np.inf)`. A motion whose end moves, with the forcing period or with a margin, has in `state` and
+        `parameters` the derivatives of the moving end, and here those at the fixed time.
+
+        Parameters
+        ----------
+        times
+            A number or an array (m,) of dimensionless times.
+
+        Returns
+        -------
+        np.ndarray
+            (2 n, 2 n + parameters) for one time, (m, 2 n, 2 n + parameters) for m: rows as in `state`, and the columns of
+            `event_times`. They are nan from where the motion has lost its derivative.
+
+        Raises
+        ------
+        ParameterError
+            A time lies outside the motion, or the motion was computed with dense=False.
+
+        Examples
+        --------
+        >>> result = saltus.sensitivities(system, theta=0.3, periods=2, parameters=["model.damping"])
+        >>> result.at([0.0, 1.0]).shape
+        (2, 2, 3)
+        """
+        wanted, motion = instants(times), self.motion
+        motion._states(wanted)  # refuses what it has no states of
+        found = np.broadcast_to(self.at_end, (wanted.size, *self.at_end.shape)).copy()
+        inner = wanted < motion.time
+        if inner.any():
+            assert self.tangent is not None
+            rates = self.tangent.states(wanted[inner])[:2]
+            own = len(motion.system.model.coordinates)
+            found[inner] = np.concatenate([x.reshape(-1, own, x.shape[1]) for x in rates], axis=1).transpose(2, 1, 0)
+        return found[0] if np.ndim(times) == 0 else found
 
     @property
     def determinant(self) -> float:
@@ -193,6 +241,8 @@ def derivatives_of(request: MotionRequest, run: Program | None, progress: Progre
         event_times=followed.shifts,
         grazings=np.array([event.time for event in motion.events.of(EventKind.GRAZING)]),
         undefined=_undefined(motion, columns),
+        tangent=followed.tangent,
+        at_end=followed.columns,
     )
 
 

@@ -15,6 +15,7 @@ from saltus.flow.motion.events import Stop
 from saltus.flow.motion.motion import Motion
 from saltus.flow.motion.recorder import MOST, Recorder
 from saltus.flow.motion.request import MotionRequest
+from saltus.flow.motion.validity import DenseOutput
 from saltus.flow.one_contact.state import KernelState
 from saltus.progress import Progress, silent
 from saltus.public_functions import Numbers
@@ -102,6 +103,7 @@ class Followed:
     motion: Motion
     columns: np.ndarray  # (2 degrees of freedom, columns): of the coordinates, then of the velocities, at the end
     shifts: np.ndarray  # (events, columns): the shift of each event
+    tangent: DenseOutput | None  # the columns' coordinates along the motion
 
 
 def follow(request: MotionRequest, progress: Progress, run: Program | None = None) -> Followed:
@@ -110,7 +112,8 @@ def follow(request: MotionRequest, progress: Progress, run: Program | None = Non
     now = (ContactState if request.system.model.holds_coordinates else KernelState).at_start(request, run)
     recorder = Recorder(request, int(now.numbers["order"]), int(now.numbers["columns"]))
     status = _advance(request.system, run, now, recorder, progress)
-    return Followed(_collect(request, now, status, recorder), now.columns, recorder.event_shifts())
+    dense, tangent = recorder.dense()
+    return Followed(_collect(request, now, status, recorder, dense), now.columns, recorder.event_shifts(), tangent)
 
 
 def _advance(system: System, run: Program, now: KernelState, recorder: Recorder, progress: Progress) -> int:
@@ -189,7 +192,7 @@ def _refuse(system: System, status: int, now: KernelState) -> None:
         raise MotionError(f"the steps shrink to nothing {at}: the acceleration is singular there, or far too large")
 
 
-def _collect(request: MotionRequest, now: KernelState, status: int, recorder: Recorder) -> Motion:
+def _collect(request: MotionRequest, now: KernelState, status: int, recorder: Recorder, dense: DenseOutput | None) -> Motion:
     """The motion from the kernel's last state and its records."""
     events, time, position, velocity = recorder.all_events(), now.time, now.position, now.velocity
     mode, one, start = now.numbers["mode"], now.position.size == 1, float(request.time)
@@ -213,7 +216,7 @@ def _collect(request: MotionRequest, now: KernelState, status: int, recorder: Re
         periods=int(now.numbers["period"]),
         events=events,
         impacts=events.impacts(),
-        dense=recorder.dense(),
+        dense=dense,
         kept=samples,
         sampled_validity=None if samples is None else recorder.validity(time - start),
     )

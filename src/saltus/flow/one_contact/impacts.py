@@ -45,9 +45,10 @@ def hold(motion):
     """Put the system at rest at contact."""
     q = motion.coordinate_series
     set_state(motion, motion.geometry[Geometry.CONTACT], 0.0)
-    for k in range(q.shape[1]):
-        q[0, k] = 0.0
-    q[0, 0] = motion.coordinates[0]
+    for i in range(motion.dof):
+        for k in range(q.shape[1]):
+            q[i, k] = 0.0
+        q[i, 0] = motion.coordinates[i]
 
 
 @lean_jit
