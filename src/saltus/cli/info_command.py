@@ -116,7 +116,7 @@ def _equal(load: Load, other: Load, shift: float) -> bool:
     span = load.period or max((_end(s) for s in _passing(load)), default=1.0)
     times = span * np.arange(PHASES) / PHASES
     for name in load.channels:
-        order = 2 if name.startswith("ground_") else 0  # for the ground only the acceleration matters
+        order = 2 if name.startswith("ground") else 0  # for the ground only the acceleration matters
         pairs = ((load, times + shift), (other, times))
         here, there = (np.broadcast_to(x.channels[name].derivative(t, x.frequency, order), times.shape) for x, t in pairs)
         if not np.allclose(here, there, rtol=1e-12, atol=1e-12 * (1 + np.abs(there).max())):
@@ -296,7 +296,7 @@ def attempt(formula: Callable[[], str]) -> str:
 
 def mean_load(load: Load) -> Load:
     """The constant parts of all forces, to which closed forms for constant loads can be applied."""
-    return Load(**{name: mean(signal) for name, signal in load.channels.items() if not name.startswith("ground_")})
+    return Load(**{name: mean(signal) for name, signal in load.channels.items() if not name.startswith("ground")})
 
 
 def mean(signal: Signal) -> float:

@@ -38,7 +38,7 @@ def _half_a_period_later(one: Load, other: Load, name: str) -> bool:
     first, second = _harmonics(one.channels[name]), _harmonics(other.channels[name])
     if first is None or second is None:
         return False
-    orders = {*first, *second} - ({0} if name.startswith("ground_") else set())
+    orders = {*first, *second} - ({0} if name.startswith("ground") else set())
     pairs = [(first.get(n, 0.0), (-1) ** n * second.get(n, 0.0)) for n in orders]
     return all(abs(a - b) <= TOLERANCES.load * (1.0 + abs(b)) for a, b in pairs)
 

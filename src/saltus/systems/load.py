@@ -70,7 +70,7 @@ class Load:
     """The loads on a system: `Load(frequency=Omega, horizontal=Harmonic(amplitude=H), vertical=-0.5)`.
 
     Each channel is a number, a `Harmonic`, a `Record`, a pulse such as `HalfSine`, or a sum of them, which may be written as a
-    list; a channel that is not named is 0. Channels that begin with `ground_` are displacements of the ground (zeta, nu), all
+    list; a channel that is not named is 0. Channels that begin with `ground` are displacements of the ground (zeta, nu), all
     others forces. Frozen.
 
     The paper's loads: (i) `loadpatha`, `Load(frequency=W, horizontal=Harmonic(amplitude=H), vertical=-0.5)`;
@@ -150,13 +150,13 @@ class DeclaredLoad:
 def _check_quantity(name: str, signal: Signal) -> None:
     terms: Any = getattr(signal, "terms", (signal,))
     for term in terms:
-        if term.once and (term.quantity == "force") == name.startswith("ground_"):
-            wanted = "displacement, velocity or acceleration" if name.startswith("ground_") else "force"
+        if term.once and (term.quantity == "force") == name.startswith("ground"):
+            wanted = "displacement, velocity or acceleration" if name.startswith("ground") else "force"
             kind = "record" if isinstance(term, Record) else type(term).__name__
             raise ParameterError(f"load.{name} takes a {kind} of {wanted}, got quantity={term.quantity!r}", f"load.{name}")
 
 
-def reversed_load(load: Load, ending: str) -> Load:
-    """A load in which the channels whose names have this ending, such as "horizontal", have the other sign."""
-    signals = {name: scaled(signal, -1.0) if name.endswith(ending) else signal for name, signal in load.channels.items()}
+def reversed_load(load: Load, *endings: str) -> Load:
+    """A load in which the channels whose names have one of these endings, such as "horizontal", have the other sign."""
+    signals = {name: scaled(signal, -1.0) if name.endswith(endings) else signal for name, signal in load.channels.items()}
     return Load(frequency=load.frequency, **signals)

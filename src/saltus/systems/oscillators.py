@@ -15,9 +15,10 @@ from saltus.systems.model import OneContactModel
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WallOscillator(OneContactModel):
-    """x'' + c x' + k x = F(tau), free while x < d; at the wall x = d the velocity turns round, v+ = -e v-.
+    """x'' + c x' + k x = F(tau) - zeta'', free while x < d; at the wall x = d the velocity turns round, v+ = -e v-.
 
-    It has one mode, which an impact at the wall ends and begins anew. It can rest at the wall while F - k d > 0.
+    x is relative to the ground, to which spring, dashpot and wall are fixed, and which the channel `ground` displaces by zeta.
+    The one mode ends with an impact at the wall and begins anew. It can rest at the wall while F - zeta'' - k d > 0.
 
     Parameters
     ----------
@@ -40,7 +41,7 @@ class WallOscillator(OneContactModel):
     wall: float = 1.0
 
     coordinates: ClassVar[tuple[str, ...]] = ("x",)
-    channels: ClassVar[tuple[str, ...]] = ("force",)
+    channels: ClassVar[tuple[str, ...]] = ("force", "ground")
 
     def __post_init__(self) -> None:
         settle_numbers(self, "stiffness", "damping", at_least=0.0)
@@ -57,8 +58,8 @@ class WallOscillator(OneContactModel):
         return self.wall
 
     def acceleration(self, t: Any, x: Any, velocity: Any, side: Any, load: Load) -> Any:
-        """x'' = F - c x' - k x."""
-        return load.force(t) - self.damping * velocity - self.stiffness * x
+        """x'' = F - zeta'' - c x' - k x."""
+        return load.force(t) - load.ground.acceleration(t) - self.damping * velocity - self.stiffness * x
 
     def gap(self, x: Any, side: Any) -> Any:
         """d - x."""
@@ -69,13 +70,15 @@ class WallOscillator(OneContactModel):
         return side, -impact.velocity_after(self, t, velocity, side, side, load)
 
     def kinetic_energy(self, t: Any, x: Any, velocity: Any, side: Any, load: Load) -> Any:
-        """v^2 / 2."""
+        """v^2 / 2, of the motion relative to the ground."""
         return velocity * velocity / 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TwoStops(ContactModel):
-    """x'' + c x' + k x = F(tau) for d_1 <= x <= d_2: contacts `left` and `right`, with an impact law such as `NewtonImpact`.
+    """x'' + c x' + k x = F(tau) - zeta'' for d_1 <= x <= d_2: contacts `left` and `right`, with a law such as `NewtonImpact`.
+
+    x is relative to the ground, to which spring, dashpot and stops are fixed, and which the channel `ground` displaces by zeta.
 
     Parameters
     ----------
@@ -100,7 +103,7 @@ class TwoStops(ContactModel):
     right: float = 1.0
 
     coordinates: ClassVar[tuple[str, ...]] = ("x",)
-    channels: ClassVar[tuple[str, ...]] = ("force",)
+    channels: ClassVar[tuple[str, ...]] = ("force", "ground")
 
     def __post_init__(self) -> None:
         settle_numbers(self, "stiffness", "damping", at_least=0.0)
@@ -115,15 +118,15 @@ class TwoStops(ContactModel):
         return left, Contact(name="right", coordinate="x", sign=-1, position=self.right)
 
     def force(self, t: Any, x: Any, velocity: Any, load: Load) -> Any:
-        """F - c x' - k x."""
-        return load.force(t) - self.damping * velocity - self.stiffness * x
+        """F - zeta'' - c x' - k x."""
+        return load.force(t) - load.ground.acceleration(t) - self.damping * velocity - self.stiffness * x
 
     def mirror(self, load: Load) -> Load | None:
-        """The load with the force reversed, for d_1 = -d_2; None otherwise."""
-        return reversed_load(load, "force") if self.left == -self.right else None
+        """The load with the force and the ground reversed, for d_1 = -d_2; None otherwise."""
+        return reversed_load(load, "force", "ground") if self.left == -self.right else None
 
     def kinetic_energy(self, t: Any, x: Any, velocity: Any, side: Any, load: Load) -> Any:
-        """x'^2 / 2."""
+        """x'^2 / 2, of the motion relative to the ground."""
         return velocity * velocity / 2
 
 
@@ -131,9 +134,11 @@ class TwoStops(ContactModel):
 class ImpactPair(ContactModel):
     """An impact damper: a case on a spring, at z, and a mass in it at the distance x from the case's middle, |x| <= d:
 
-        z'' + c z' + k z + mu (z'' + x'') = F(tau),    mu (z'' + x'') = 0 while no wall pushes.
+        z'' + c z' + k z + mu (z'' + x'') = F(tau) - (1 + mu) zeta'',
+        mu (z'' + x'') = -mu zeta'' while no wall pushes.
 
-    The coordinates are those of T = (z'^2 + mu (z' + x')^2) / 2, so that an impact at a wall acts on x alone, and the balance of
+    z is relative to the ground, to which spring and dashpot are fixed, and which the channel `ground` displaces by zeta. The
+    coordinates are those of T = (z'^2 + mu (z' + x')^2) / 2, so that an impact at a wall acts on x alone, and the balance of
     momentum gives the jump of z'. Contacts `left` at x = -d and `right` at x = d.
 
     Parameters
@@ -159,7 +164,7 @@ class ImpactPair(ContactModel):
     clearance: float = 1.0
 
     coordinates: ClassVar[tuple[str, ...]] = ("z", "x")
-    channels: ClassVar[tuple[str, ...]] = ("force",)
+    channels: ClassVar[tuple[str, ...]] = ("force", "ground")
 
     def __post_init__(self) -> None:
         settle_numbers(self, "mass_ratio", "clearance", above=0.0)
@@ -176,15 +181,17 @@ class ImpactPair(ContactModel):
         return [[1.0 + self.mass_ratio, self.mass_ratio], [self.mass_ratio, self.mass_ratio]]
 
     def force(self, t: Any, q: Any, velocity: Any, load: Load) -> tuple[Any, Any]:
-        """(F - c z' - k z, 0)."""
-        return load.force(t) - self.damping * velocity[0] - self.stiffness * q[0], 0.0 * q[1]
+        """(F - (1 + mu) zeta'' - c z' - k z, -mu zeta'')."""
+        ground = load.ground.acceleration(t)
+        pushed = load.force(t) - (1.0 + self.mass_ratio) * ground - self.damping * velocity[0] - self.stiffness * q[0]
+        return pushed, 0.0 * q[1] - self.mass_ratio * ground
 
     def mirror(self, load: Load) -> Load:
-        """The load with the force reversed."""
-        return reversed_load(load, "force")
+        """The load with the force and the ground reversed."""
+        return reversed_load(load, "force", "ground")
 
     def kinetic_energy(self, t: Any, q: Any, velocity: Any, side: Any, load: Load) -> Any:
-        """(z'^2 + mu (z' + x')^2) / 2."""
+        """(z'^2 + mu (z' + x')^2) / 2, of the motion relative to the ground."""
         together = velocity[0] + velocity[1]
         return (velocity[0] * velocity[0] + self.mass_ratio * together * together) / 2
 

@@ -53,7 +53,7 @@ class Physical:
     def _convert(self, load: Load, by_time: Callable[..., Any], by_rate: Callable[..., Any], power: int) -> Load:
         """The load with times and rates converted by the unit of time, and values multiplied by the `power` of their unit."""
         units = self.units
-        forces = [name for name in load.channels if not name.startswith("ground_")]
+        forces = [name for name in load.channels if not name.startswith("ground")]
         if forces and "force" not in units:
             raise ParameterError(f"a {type(self).__name__} has no unit of force for load.{forces[0]}", f"load.{forces[0]}")
 
@@ -68,7 +68,7 @@ class Physical:
             return scaled(signal, units[quantity] ** power)
 
         channels = {
-            name: convert(signal, "displacement" if name.startswith("ground_") else "force")
+            name: convert(signal, "displacement" if name.startswith("ground") else "force")
             for name, signal in load.channels.items()
         }
         return Load(frequency=None if load.frequency is None else by_rate(load.frequency, units["time"]), **channels)
