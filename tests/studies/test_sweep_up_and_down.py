@@ -91,6 +91,29 @@ def test_any_parameter_of_the_load_is_swept():
     assert data.hysteresis.any()
 
 
+def test_a_function_is_asked_of_the_motion_on_which_each_value_is_left():
+    """P = c (w X)^2 / 2 of the linear motion; with impacts what the load gives on the orbit."""
+    grid = np.linspace(1.3, 1.6, 4)
+    data = saltus.frequency_sweep(oscillator(wall=50.0), grid, x=0.0, functions={"power": saltus.mean_dissipated_power})
+    assert data.power.values == pytest.approx(np.tile(DAMPING * (grid * FORCE * linear_gain(grid)) ** 2 / 2, (2, 1)), rel=1e-6)
+    seen = saltus.frequency_sweep(oscillator(), [1.05, 1.1], x=1.0, functions={"impacts": lambda motion: len(motion.impacts)})
+    assert (seen.impacts == seen.impact_count).all()
+    assert (seen.impacts > 0).any()
+
+
+def test_falling_values_are_swept_down_first():
+    """From rest at 1.5 the linear motion is kept down to where it grazes; begun at 1.02 the sweep is on the impacting one."""
+    down, up = (
+        saltus.frequency_sweep(oscillator(), grid, x=0.1) for grid in (np.linspace(1.5, 1.02, 9), np.linspace(1.02, 1.5, 9))
+    )
+    assert (down.value == up.value).all()
+    assert (np.diff(down.value) > 0).all()
+    later = {"value": 1.2, "method": "nearest"}
+    assert down.amplitude.sel(direction="down").sel(**later) == pytest.approx(FORCE * linear_gain(1.2), rel=1e-6)
+    assert np.array(jumps(down, "down")) == pytest.approx(np.array(jumps(up, "down")), abs=1e-4)
+    assert np.array(jumps(down, "up")) == pytest.approx(np.array(jumps(up, "up")), abs=1e-4)
+
+
 def test_a_slow_sweep_follows_the_response_within_its_rate():
     grid = np.linspace(1.3, 1.6, 601)
     data = saltus.frequency_sweep(oscillator(1.3, wall=50.0), grid, periods=1, stop_early=False, x=0.0)
@@ -146,7 +169,9 @@ x = 0.1
     ("change", "sentence"),
     [
         ({"values": [1.0]}, "values must be two or more"),
-        ({"values": [1.2, 1.0]}, "must be numbers that rise"),
+        ({"values": [1.2, 1.0, 1.1]}, "must be numbers that rise"),
+        ({"functions": {"power": 3.0}}, "functions must be functions of a motion, and 'power' is 3.0"),
+        ({"functions": {"state": lambda motion: motion.final_state}}, "functions must return a number, and 'state' returned"),
         ({"path": "load.force"}, "not a number"),
         ({"periods": 0}, "periods"),
         ({"y": 0.3}, "no coordinate 'y'"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.checks import check_axis, check_count, check_number
-from saltus.errors import ParameterError
-from saltus.flow import Ending, Recurrence, captured_between, find_recurrence, rate_name
+from saltus.errors import ParameterError, shown
+from saltus.flow import Ending, Motion, Recurrence, captured_between, find_recurrence, rate_name, simulate
 from saltus.progress import Progress, silent
 from saltus.provenance import provenance
 from saltus.public_functions import checked_by
@@ -56,9 +56,11 @@ class SweepRequest:
     stop_early: bool
     max_period: int
     tol: float
+    functions: Any
     velocity: Any
     coordinates: Any
     grid: np.ndarray = field(init=False)
+    falling: bool = field(init=False)  # whether the sweep begins downwards
     start: np.ndarray = field(init=False)  # (d,)
 
     def __post_init__(self) -> None:
@@ -66,14 +68,20 @@ class SweepRequest:
         if self.system.load.frequency is None:
             raise ParameterError("a sweep needs a load with a frequency; give the Load one", "load.frequency")
         check_path(self.system, self.path)
-        grid = check_axis("values", self.values)
-        if grid.size < 2 or not (np.diff(grid) > 0).all():
-            raise ParameterError(f"values must be two or more that increase, got {self.values!r}", "values")
+        given = np.asarray(self.values)
+        falling = given.ndim == 1 and given.size > 1 and bool(given[0] > given[1])
+        grid = check_axis("values", given[::-1] if falling else self.values)
+        if grid.size < 2:
+            raise ParameterError(f"values must be two or more that increase or that fall, got {self.values!r}", "values")
+        for name, function in (self.functions or {}).items():
+            if not callable(function):
+                raise ParameterError(f"functions must be functions of a motion, and {name!r} is {shown(function)}", "functions")
         check_along(self.system, self.path, grid, "values")
         check_count("periods", self.periods, 1)
         check_count("max_period", self.max_period, 1)
         check_number("tol", self.tol, at_least=1e-15, at_most=1e-6)
         object.__setattr__(self, "grid", grid)
+        object.__setattr__(self, "falling", falling)
         object.__setattr__(self, "start", read_start(self.system, self.velocity, self.coordinates, self.__dataclass_fields__))
 
     def proved_speeds(self, values: np.ndarray) -> np.ndarray:
@@ -98,6 +106,22 @@ class SweepRequest:
             threads=1,
         )
 
+    def numbers_of(self, value: float, row: Recurrence) -> list[float]:
+        """The functions of the motion on which one value was left: one period of it or, if it has none, `max_period`."""
+        if not self.functions:
+            return []
+        names, last = self.system.model.coordinates, row.last[0]
+        start = dict(zip(names, last[: len(names)].tolist(), strict=True))
+        speeds, periods = tuple(last[len(names) :].tolist()), int(row.period[0]) or self.max_period
+        velocity = speeds[0] if len(names) == 1 else speeds
+        system = self.system.with_({self.path: float(value)})
+        motion = simulate(system, **start, velocity=velocity, periods=periods, tol=self.tol)
+        numbers = {name: np.asarray(function(motion)) for name, function in self.functions.items()}
+        for name, number in numbers.items():
+            if number.ndim or number.dtype.kind not in "biuf":
+                raise ParameterError(f"functions must return a number, and {name!r} returned {shown(number)}", "functions")
+        return [float(number) for number in numbers.values()]
+
 
 def _check(progress: object = None, **arguments: Any) -> None:
     SweepRequest(coordinates=_taken_out(arguments), **arguments)
@@ -120,11 +144,12 @@ def frequency_sweep(
     max_period: int = 16,
     velocity: float = 0.0,
     tol: float = 1e-11,
+    functions: Mapping[str, Callable[[Motion], Any]] | None = None,
     progress: Progress = silent,
     **coordinates: float,
 ) -> xarray.Dataset:
     """The response while a parameter goes up and down again, as in an experiment: at each value the motion starts from the last
-    state at the value before.
+    state at the value before. If the values fall, the sweep goes down and then up.
 
     With `stop_early`, each value is kept until the motion repeats itself. Without, it is kept for exactly `periods` forcing
     periods: with periods=1 and many values the parameter changes slowly and steadily. Values change at phase 0 of the load, so
@@ -139,7 +164,7 @@ def frequency_sweep(
     system
         What moves, under a load with a frequency.
     values
-        Values of the parameter, increasing.
+        Values of the parameter, increasing or falling.
     path
         Dotted path of the parameter.
     periods
@@ -152,16 +177,20 @@ def frequency_sweep(
         The state at the first value, at phase 0.
     tol
         The error that one step of the integration may make.
+    functions
+        Quantities of one's own by name: numbers of the motion on which each value was left, which begins at phase 0 and takes one
+        period or, where it does not repeat itself, `max_period` forcing periods.
     progress
         Called with the fraction done and what is being done.
 
     Returns
     -------
     xarray.Dataset
-        A Dataset. Over (direction, value): `amplitude` (largest absolute value), `largest_...` and `smallest_...` of the first
-        coordinate in the motion's period; `impact_count`, `period` (0: it does not repeat itself), `outcome` and the state at
-        phase 0. Over (value): `hysteresis`. Over (jump): its direction, the values that enclose it and the amplitudes there. At
-        values that were not reached, as a margin ended the motion before, there is nan.
+        A Dataset, whose values increase. Over (direction, value): `amplitude` (largest absolute value), `largest_...` and
+        `smallest_...` of the first coordinate in the motion's period; `impact_count`, `period` (0: it does not repeat itself),
+        `outcome`, the state at phase 0, and the `functions`. Over (value): `hysteresis`. Over (jump): its direction, the values
+        that enclose it and the amplitudes there. At values that were not reached, as a margin ended the motion before, there is
+        nan.
 
     Raises
     ------
@@ -176,15 +205,18 @@ def frequency_sweep(
     """
     asked = SweepRequest(
         system=system, path=path, values=values, periods=periods, stop_early=stop_early, max_period=max_period, tol=tol,
-        velocity=velocity, coordinates=coordinates,
+        functions=functions, velocity=velocity, coordinates=coordinates,
     )  # fmt: skip
-    up = _swept(asked, asked.grid, asked.start, lambda done: progress(0.5 * done, f"{path} up"))
-    reached = len(up.rows)
-    state = up.rows[-1].last[0] if reached else asked.start
-    down = _swept(asked, asked.grid[:reached][::-1], state, lambda done: progress(0.5 + 0.5 * done, f"{path} down"))
-    jumps = [(name, *jump) for name, run in zip(DIRECTIONS, (up, down), strict=True) for jump in _jumps(asked, run)]
+    there, back = DIRECTIONS[:: -1 if asked.falling else 1]
+    order = asked.grid[:: -1 if asked.falling else 1]
+    first = _swept(asked, order, asked.start, lambda done: progress(0.5 * done, f"{path} {there}"))
+    reached = len(first.rows)
+    state = first.rows[-1].last[0] if reached else asked.start
+    second = _swept(asked, order[:reached][::-1], state, lambda done: progress(0.5 + 0.5 * done, f"{path} {back}"))
+    runs = {there: first, back: second}
+    jumps = [(name, *jump) for name, run in runs.items() for jump in _jumps(asked, run)]
     progress(1.0, "done")
-    return _dataset(asked, (up, down), jumps)
+    return _dataset(asked, (runs["up"], runs["down"]), jumps)
 
 
 @dataclass(frozen=True)
@@ -194,6 +226,7 @@ class _OneWay:
     values: np.ndarray
     start: np.ndarray
     rows: list[Recurrence]
+    numbers: list[list[float]]  # of the functions
 
     @property
     def amplitude(self) -> np.ndarray:
@@ -208,13 +241,14 @@ def amplitude_of(row: Recurrence) -> float:
 
 def _swept(asked: SweepRequest, values: np.ndarray, state: np.ndarray, progress: Any) -> _OneWay:
     """Follow the motion from value to value, until a margin ends it."""
-    run = _OneWay(values, state, [])
+    run = _OneWay(values, state, [], [])
     for i, (value, captured) in enumerate(zip(values, asked.proved_speeds(values), strict=True)):
         progress(i / len(values))
         row = asked.end_at_value(value, captured, state)
         if row.ended[0]:
             break
         run.rows.append(row)
+        run.numbers.append(asked.numbers_of(value, row))
         state = row.last[0]
     return replace(run, values=values[: len(run.rows)])
 
@@ -292,6 +326,11 @@ def _dataset(asked: SweepRequest, runs: tuple[_OneWay, _OneWay], jumps: list[tup
         columns[state] = (partial(_state_of, i), model.unit_of(names[i % len(names)]), f"{state} at phase 0")
     table = {key: np.full((2, count), np.nan) for key in columns}
     outcome = np.full((2, count), "", dtype="<U8")
+    own = {str(name): np.full((2, count), np.nan) for name in asked.functions or {}}
+    for way, run in enumerate(runs):
+        places = np.searchsorted(asked.grid, run.values)
+        for i, values in enumerate(own.values()):
+            values[way, places] = [numbers[i] for numbers in run.numbers]
     for run, values, words in zip(runs, zip(*table.values(), strict=True), outcome, strict=True):
         places = np.searchsorted(asked.grid, run.values)
         words[places] = [Ending(int(row.outcome[0])).name.lower() for row in run.rows]
@@ -302,6 +341,7 @@ def _dataset(asked: SweepRequest, runs: tuple[_OneWay, _OneWay], jumps: list[tup
         {key: (over, table[key], {"units": units, "long_name": text}) for key, (_, units, text) in columns.items()},
         {"direction": list(DIRECTIONS), "value": ("value", asked.grid, {"units": "1", "long_name": asked.path})},
     )
+    data = data.assign({name: (over, values, {"units": "1", "long_name": name}) for name, values in own.items()})
     data["outcome"] = (over, outcome, {"long_name": "rest, periodic, or moving without repeating itself"})
     up, down = table["amplitude"]
     apart = np.abs(up - down) > SETTINGS.hysteresis * np.nanmax(table["amplitude"], initial=0.0)
