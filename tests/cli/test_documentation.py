@@ -15,7 +15,7 @@ from saltus.systems import IMPACTS, MODELS
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "study.md").read_text(encoding="utf-8")
-ORBITS = (ROOT / "docs" / "orbits.md").read_text(encoding="utf-8")
+ORBITS = "".join((ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8") for name in ("orbits", "spectra"))
 ENSEMBLES = (ROOT / "docs" / "ensembles.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL)
 

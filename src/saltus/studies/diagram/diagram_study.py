@@ -274,7 +274,7 @@ def bifurcation_diagram(
     -------
     xarray.DataTree
         A DataTree: the branches in `branches`, `points`, `special` and `orbits` (`branch_of` gives one), `attractors`,
-        `unplaced`, `bands`, `exponents`, `stroboscopic` and `search`; docs/orbits.md lists their variables and attributes.
+        `unplaced`, `bands`, `exponents`, `stroboscopic` and `search`; docs/spectra.md lists their variables and attributes.
 
     Raises
     ------
