@@ -48,6 +48,7 @@ MAY_IMPORT = {
     "studies": {"systems", "theory", "flow", "continuation", "orbits", "attractors", "sweep"},
     "plots": set(),
     "config": {"systems", "flow", "attractors", "sweep", "studies"},
+    "web": {"systems", "taylor", "flow", "config"},
     "cli": {"systems", "theory", "flow", "taylor", "orbits", "attractors", "sweep", "studies", "plots", "config"},
 }
 TEXTS = {f"saltus.taylor.{name}" for name in ("lane_memory", "lane_vectors", "load_tables", "vectors")}  # of the lanes
@@ -265,7 +266,7 @@ CEILINGS = {
     "arguments of a compiled function": 11,
     "public names behind doors": 483,
     "tuned numbers": 504,
-    "files of the library": 299,
+    "files of the library": 301,
 }
 
 

@@ -1,0 +1,97 @@
+"""One HTML file of all that a page needs: markup, style, modules, the description of a system and its compiled code."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import hashlib
+import html
+import json
+import re
+from collections.abc import Mapping
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+PAGE = Path(__file__).parent / "page"  # the page's own sources
+IMPORT = re.compile(r'^import \{([^}]*)\} from "\./([\w]+)\.js";\n', re.MULTILINE)
+EXPORT = re.compile(r"^export (?:async )?(?:function|class|const) (\w+)", re.MULTILINE)
+COMMENT = re.compile(r"[ \t]*/\*\*.*?\*/\n?", re.DOTALL)
+
+
+def one_file(description: Mapping[str, Any], wasm: bytes, *, entry: Path = PAGE / "boot.js") -> str:
+    """The page of a system as one HTML text, which needs no other file and connects to nothing.
+
+    Parameters
+    ----------
+    description
+        What `engine.js` and the page are told of the system; it is put in as JSON, so that no text of a study is markup.
+    wasm
+        The compiled code of the system's kernel and model.
+    entry
+        The module with which the page begins.
+    """
+    script, style = joined(entry), (PAGE / "page.css").read_text()
+    worker = joined(PAGE / "worker.js") if (PAGE / "worker.js").exists() else ""
+    parts = {
+        "policy": _policy(script, style),
+        "version": html.escape(metadata.version("saltus")),
+        "title": html.escape(str(description.get("title") or description["model"]["name"])),
+        "style": style,
+        "description": json.dumps(description, allow_nan=False).replace("<", "\\u003c"),
+        "wasm": base64.b64encode(gzip.compress(wasm, 9, mtime=0)).decode(),
+        "worker": worker,
+        "script": script,
+    }
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], (PAGE / "page.html").read_text())
+
+
+@cache
+def joined(entry: Path) -> str:
+    """A module with all that it imports as one text: each module a function that returns what it exports, in their order."""
+    texts: dict[Path, str] = {}
+    _collect(entry, texts, ())
+    text = "\n".join(_wrapped(path, source) for path, source in texts.items())
+    if re.search("</script|<!--", text, re.IGNORECASE):
+        raise ValueError(f"{entry.name}: a module must not contain the end of its own script element")
+    return text
+
+
+def _collect(path: Path, texts: dict[Path, str], above: tuple[Path, ...]) -> None:
+    if path in above:
+        raise ValueError(f"{path.name} imports itself through {', '.join(each.name for each in above)}")
+    if path in texts:
+        return
+    source = COMMENT.sub("", path.read_text())
+    for _, name in IMPORT.findall(source):
+        _collect(_beside(path, name), texts, (*above, path))
+    texts[path] = source
+
+
+def _beside(path: Path, name: str) -> Path:
+    """A module of that name beside another one, or among the page's sources."""
+    near = path.parent / f"{name}.js"
+    return near if near.exists() else PAGE / f"{name}.js"
+
+
+def _wrapped(path: Path, source: str) -> str:
+    body = IMPORT.sub(lambda found: f"const {{{' '.join(found[1].split())}}} = module_{found[2]};\n", source)
+    if re.search(r"^import\b|^export (?:default|\{|\*)", body, re.MULTILINE):
+        raise ValueError(f"{path.name}: only `import {{ names }} from './module.js'` and exported declarations can be joined")
+    names = EXPORT.findall(body)
+    body = re.sub(r"^export (?!\{)", "", body, flags=re.MULTILINE).replace("{};\n", "", 0)
+    return f"const module_{path.stem} = (() => {{\n{body.strip()}\nreturn {{{', '.join(names)}}};\n}})();"
+
+
+def _policy(script: str, style: str) -> str:
+    """What the page may do: run its own script and style, compile its own code, and start workers of its own text."""
+    own = {name: _hash(text) for name, text in (("script", script), ("style", style))}
+    return (
+        f"default-src 'none'; script-src {own['script']} 'wasm-unsafe-eval'; style-src {own['style']}; worker-src blob:; "
+        "img-src data: blob:; base-uri 'none'; form-action 'none'"
+    )
+
+
+def _hash(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"

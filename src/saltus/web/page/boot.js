@@ -1,0 +1,40 @@
+/** Where the page begins: it reads what Python has put into it, opens the engine, and makes the page. */
+
+import { open } from "./engine.js";
+import { Page } from "./main.js";
+
+/** What stands in a data block of the page. @param {string} id */
+function block(id) {
+  return document.getElementById(id)?.textContent ?? "";
+}
+
+/** Bytes from base64 text of a gzip file. @param {string} text */
+export async function unpacked(text) {
+  const packed = Uint8Array.from(atob(text.trim()), (letter) => letter.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+/** A worker of the text that stands in the page. */
+function makeWorker() {
+  const address = URL.createObjectURL(new Blob([block("worker")], { type: "text/javascript" }));
+  const worker = new Worker(address);
+  URL.revokeObjectURL(address);
+  return worker;
+}
+
+async function boot() {
+  const notice = document.getElementById("notice");
+  try {
+    const description = JSON.parse(block("description"));
+    const wasm = await unpacked(block("wasm"));
+    const engine = await open(wasm, description);
+    Object.assign(globalThis, { saltusPage: new Page({ engine, description, makeWorker, wasm }) });
+  } catch (error) {
+    if (!notice) return;
+    notice.hidden = false;
+    notice.textContent = `This page cannot compute here: ${error instanceof Error ? error.message : String(error)}`;
+  }
+}
+
+boot();

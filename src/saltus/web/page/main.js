@@ -1,0 +1,471 @@
+/** The page put together: it opens the engine, makes the controls and the views, and lets them follow one state. */
+
+import { Frame, Store } from "./store.js";
+import { MOST_PERIODS, Session, refusalFrom } from "./session.js";
+import { Plot } from "./plot.js";
+import { Stage } from "./stage.js";
+import { Transport, button } from "./transport.js";
+import { numberGroup } from "./controls.js";
+import { energyView, phasePlane, stroboscopic, timeHistory } from "./views.js";
+import { validityNow, validityOfAll } from "./validity.js";
+import { linkOf, stateOf } from "./link.js";
+import { asCsv, asPng, asPython, asSvg, asToml, save } from "./exports.js";
+import { Sweep } from "./sweep.js";
+import { BASIN_GRID, Basins } from "./basins.js";
+import { basinsLegend, basinsView, sweepControls, sweepSaid, sweepView } from "./laboratory.js";
+import { Choice, ofThisSystem, orbitSaid, paintBeneath, resultView } from "./results_view.js";
+import { currentPalette } from "./palette.js";
+import { parameterName } from "./symbols.js";
+
+/** @typedef {import("./types.js").Description} Description */
+/** @typedef {import("./types.js").Engine} Engine */
+/** @typedef {import("./types.js").State} State */
+/** @typedef {import("./types.js").NumberEntry} NumberEntry */
+/** @typedef {import("./views.js").View} View */
+
+const FIRST_SPEED = 4; // units of time per second
+const BASIN_PERIODS = 100; // of each motion of a basin at most
+
+/** All numbers of a system, in the order in which the page shows them. @param {Description} description */
+export function entriesOf(description) {
+  const impact = description.impact?.parameters ?? [];
+  return [...description.model.parameters, ...impact, ...description.load.flatMap(({ parameters }) => parameters)];
+}
+
+/** The state with which the page opens: the study itself. @param {Description} description @returns {State} */
+export function firstState(description) {
+  const entries = entriesOf(description);
+  const values = Object.fromEntries(entries.map(({ path, value }) => [path, value]));
+  const { simulate } = description.study;
+  const swept = entries.find(({ path }) => path === "load.frequency") ?? entries[0];
+  return {
+    values, start: { ...description.start }, periods: simulate.periods ?? simulate.duration ?? 20, cursor: description.start.time ?? 0,
+    hover: null, playing: false, speed: FIRST_SPEED, coordinate: 0, degrees: entries.some(({ angle }) => angle), theme: "system",
+    windows: {}, ranges: {}, selected: null,
+    sweep: { path: swept?.path ?? "", low: swept?.low ?? 0, high: swept?.high ?? 1, count: 61, periods: 60 },
+  };
+}
+
+/**
+ * The page.
+ * @typedef {object} Opening
+ * @property {Engine} engine @property {Description} description @property {() => import("./basins.js").WorkerLike} makeWorker
+ * @property {Uint8Array|null} wasm
+ */
+export class Page {
+  /** @param {Opening} opening */
+  constructor({ engine, description, makeWorker, wasm }) {
+    this.description = description;
+    this.first = firstState(description);
+    const linked = stateOf(location.hash.slice(1), this.first, description);
+    this.store = new Store("state" in linked ? tamed(linked.state, description) : this.first);
+    this.session = new Session(engine, description, this.store);
+    this.frame = new Frame();
+    /** @type {{plot: Plot, view: View}[]} */
+    this.plots = [];
+    /** @type {import("./controls.js").NumberField[]} */
+    this.fields = [];
+    const { own, refused } = ofThisSystem(description.results ?? [], description.digest);
+    this.results = own;
+    this.session.compute();
+    if (this.session.refusal && "state" in linked) this.store.state = this.first;
+    this.session.compute();
+    this.stage = new Stage(at("stage"), this.session);
+    this.stage.measure();
+    this.transport = new Transport(at("transport"), this.session);
+    this.sweep = new Sweep(this.session, () => this.sweepTold());
+    this.basins = new Basins(this.session, makeWorker, { wasm, description }, () => this.basinsTold());
+    this.makeHead();
+    this.makeControls();
+    this.makeViews();
+    this.makeLaboratory();
+    this.makeResults(refused);
+    this.follow();
+    this.notice("refusal" in linked ? linked.refusal : "");
+    this.drawAll();
+  }
+
+  makeHead() {
+    const { description, store } = this;
+    document.title = description.title || description.model.name;
+    at("title").textContent = description.title || spaced(description.model.name);
+    at("subtitle").textContent = description.title ? spaced(description.model.name) : "";
+    const theme = /** @type {HTMLSelectElement} */ (at("theme"));
+    theme.value = store.state.theme;
+    theme.addEventListener("change", () => store.set({ theme: /** @type {any} */ (theme.value) }));
+    at("copy-link").addEventListener("click", () => this.copyLink());
+    at("save-toml").addEventListener("click", () => save("study.toml", asToml(description, store.state)));
+    at("save-python").addEventListener("click", () => save("study.py", asPython(description, store.state)));
+    at("reset-all").addEventListener("click", () => this.replaceState({ ...this.first, theme: store.state.theme, degrees: store.state.degrees }));
+    this.applyTheme();
+  }
+
+  makeControls() {
+    const { description, store } = this;
+    const panel = at("numbers");
+    const host = {
+      value: (/** @type {string} */ path) => this.numberAt(path), change: (/** @type {string} */ path, /** @type {number} */ value) => this.change(path, value),
+      degrees: () => store.state.degrees, range: (/** @type {string} */ path) => store.state.ranges[path] ?? null,
+      setRange: (/** @type {string} */ path, /** @type {[number, number]} */ range) => store.set({ ranges: { ...store.state.ranges, [path]: range } }),
+    };
+    const group = (/** @type {string} */ title, /** @type {NumberEntry[]} */ entries) => this.fields.push(...numberGroup(panel, title, entries, host));
+    group("Model", description.model.parameters);
+    group(description.impact?.name ? `Impact law: ${spaced(description.impact.name)}` : "Impact law", description.impact?.parameters ?? []);
+    group("Load", description.load.flatMap(({ parameters }) => parameters));
+    group("Start", this.startEntries());
+    const degrees = /** @type {HTMLInputElement} */ (at("degrees"));
+    degrees.checked = store.state.degrees;
+    degrees.addEventListener("change", () => store.set({ degrees: degrees.checked }));
+    at("degrees-row").hidden = ![...entriesOf(description), ...this.startEntries()].some(({ angle }) => angle);
+  }
+
+  /** The initial state and the duration as numbers with sliders. @returns {NumberEntry[]} */
+  startEntries() {
+    const { first, description } = this;
+    const reach = (/** @type {number} */ value) => Math.max(2, 2 * Math.abs(value));
+    const states = description.model.coordinates.flatMap(({ name, velocity, unit }) => {
+      const angle = unit === "rad";
+      const [x, v] = [first.start[name] ?? 0, first.start[velocity] ?? 0];
+      return [
+        { path: `start.${name}`, unit, value: x, low: -reach(x), high: reach(x), angle, symbol: name },
+        { path: `start.${velocity}`, unit: "1", value: v, low: -reach(v), high: reach(v), symbol: velocity },
+      ];
+    });
+    const time = { path: "start.time", unit: "1", value: first.start.time ?? 0, low: 0, high: 2 * Math.PI, symbol: "tau" };
+    const periodic = this.session.period !== null;
+    const lasting = { path: periodic ? "start.periods" : "start.duration", unit: periodic ? "T" : "1", value: first.periods, low: 1, high: Math.max(120, first.periods) };
+    return [...states, time, lasting];
+  }
+
+  /** @param {string} path */
+  numberAt(path) {
+    const { state } = this.store;
+    if (path === "start.periods" || path === "start.duration") return state.periods;
+    return path.startsWith("start.") ? (state.start[path.slice(6)] ?? 0) : (state.values[path] ?? NaN);
+  }
+
+  /** Change a number if the engine takes it. @param {string} path @param {number} value @returns {{message: string}|null} */
+  change(path, value) {
+    const { state } = this.store;
+    if (!Number.isFinite(value)) return { message: `${path} must be finite, got ${value}` };
+    if (path === "start.periods" || path === "start.duration") {
+      if (!(value > 0 && value <= MOST_PERIODS)) return { message: `${path.slice(6)} must lie in (0, ${MOST_PERIODS}] on this page, got ${value}` };
+      this.store.set({ periods: value });
+      return null;
+    }
+    if (path.startsWith("start.")) {
+      const start = { ...state.start, [path.slice(6)]: value };
+      const refused = this.tried(state.values, start);
+      if (!refused) this.store.set({ start, selected: null, ...(path === "start.time" ? { cursor: value } : {}) });
+      return refused;
+    }
+    const values = { ...state.values, [path]: value };
+    const refused = this.session.refusalOf(values);
+    if (!refused) this.store.set({ values, selected: null });
+    return refused;
+  }
+
+  /** Whether a motion can start: null, or the sentence. @param {Record<string, number>} values @param {Record<string, number>} start */
+  tried(values, start) {
+    try {
+      const system = this.session.engine.system(values);
+      this.session.engine.simulate(system, start, 1e-6);
+      return null;
+    } catch (error) {
+      return refusalFrom(error);
+    }
+  }
+
+  /** Start a motion at a point of the phase plane that is shown. @param {number} x @param {number} y */
+  startAt(x, y) {
+    const { state } = this.store;
+    const chosen = /** @type {any} */ (this.description.model.coordinates[state.coordinate]);
+    const start = { ...state.start, [chosen.name]: x, [chosen.velocity]: y };
+    const refused = this.tried(state.values, start);
+    this.notice(refused?.message ?? "");
+    if (!refused) this.store.set({ start, cursor: start.time ?? 0, selected: null });
+  }
+
+  makeViews() {
+    const { session } = this;
+    const show = (/** @type {number} */ time) => this.transport.to(time);
+    const beneath = (/** @type {any} */ painter) => {
+      const chosen = /** @type {any} */ (session.coordinates[this.store.state.coordinate]);
+      paintBeneath(painter, this.results, [chosen.name, chosen.velocity]);
+    };
+    this.addPlot(phasePlane(session, (x, y) => this.startAt(x, y), beneath));
+    this.addPlot(timeHistory(session, show));
+    this.addPlot(stroboscopic(session, show));
+    this.addPlot(energyView(session, show));
+    const choice = /** @type {HTMLSelectElement} */ (at("coordinate"));
+    session.coordinates.forEach(({ name }, i) => choice.add(new Option(name.replace(/_/g, " "), String(i))));
+    choice.value = String(this.store.state.coordinate);
+    choice.addEventListener("change", () => this.store.set({ coordinate: Number(choice.value), windows: {} }));
+    at("coordinate-row").hidden = session.coordinates.length < 2;
+  }
+
+  /** @param {View} view */
+  addPlot(view) {
+    const host = at(`view-${view.id}`);
+    const plot = new Plot(host, {
+      ...view, window: () => /** @type {any} */ (this.store.state.windows[view.id] ?? null),
+      zoomed: (window_) => this.store.set({ windows: { ...this.store.state.windows, [view.id]: window_ } }),
+    });
+    const keys = "Arrow keys move the cursor, with Shift the window; plus, minus and 0 zoom.";
+    plot.top.setAttribute("aria-description", `${view.instructions ?? ""} ${keys}`);
+    plot.top.title = view.instructions ?? "";
+    this.plots.push({ plot, view });
+    const menu = host.closest("figure")?.querySelector(".save");
+    if (!(menu instanceof HTMLElement)) return;
+    button(menu, "png", "PNG", async () => save(`${view.id}.png`, await asPng(plot)));
+    button(menu, "svg", "SVG", () => save(`${view.id}.svg`, asSvg(plot), "image/svg+xml"));
+    button(menu, "csv", "CSV", () => save(`${view.id}.csv`, asCsv(view.csv()), "text/csv"));
+    for (const each of menu.querySelectorAll("button")) each.setAttribute("aria-label", `${view.title} as ${each.textContent}`);
+  }
+
+  makeLaboratory() {
+    const { session } = this;
+    const entries = entriesOf(this.description);
+    const controls = sweepControls(at("sweep-controls"), session, entries, this.sweep);
+    this.sweepSaid = controls.said;
+    this.sweepRun = controls.run;
+    this.addPlot(sweepView(session, this.sweep, (path, value, state) => this.showMotion({ [path]: value }, state && this.choice?.startFrom(state, 0), null)));
+    this.addPlot(basinsView(session, this.basins, (x, y) => this.startAt(x, y)));
+    at("basins-run").addEventListener("click", () => this.toggleBasins());
+  }
+
+  toggleBasins() {
+    if (!this.basins.done) {
+      this.basins.stop();
+      this.basinsTold();
+    } else if (this.session.period) this.basins.start(this.planeWindow(), BASIN_PERIODS);
+  }
+
+  /** The window of the phase plane, over which basins are computed. */
+  planeWindow() {
+    return this.plotOf("phase")?.seen() ?? [-1, 1, -1, 1];
+  }
+
+  /** @param {string} id */
+  plotOf(id) {
+    return this.plots.find(({ view }) => view.id === id)?.plot;
+  }
+
+  sweepTold() {
+    const { result } = this.sweep;
+    if (this.sweepSaid) this.sweepSaid.textContent = sweepSaid(result);
+    if (this.sweepRun) this.sweepRun.textContent = result.done ? "Sweep up and down" : "Stop";
+    this.frame.before("sweep", () => this.plotOf("sweep")?.draw());
+  }
+
+  basinsTold() {
+    const { basins } = this;
+    const cells = BASIN_GRID * BASIN_GRID;
+    at("basins-run").textContent = basins.done ? "Compute basins" : "Stop";
+    const share = `${((100 * basins.counted) / cells).toFixed(0)} % of ${BASIN_GRID} × ${BASIN_GRID} cells`;
+    const { undecided, ended } = basins.open();
+    const rest = undecided || ended ? `; ${undecided} undecided after ${BASIN_PERIODS} periods, ${ended} ended` : "";
+    at("basins-said").textContent = basins.refusal || (basins.labels.length ? share + rest : "");
+    this.frame.before("basins", () => {
+      basinsLegend(at("basins-legend"), basins, currentPalette().basins);
+      this.plotOf("basins")?.draw();
+    });
+  }
+
+  /** @param {string[]} refused */
+  makeResults(refused) {
+    const { store } = this;
+    this.shownResult = store.state.selected?.result ?? this.results.findIndex(({ kind }) => kind === "diagram" || kind === "chart");
+    this.choice = new Choice(this.session, (numbers, start, periods) => this.showMotion(numbers, start, periods), () => this.shownResult ?? 0);
+    at("results").hidden = !(anyShown(this.results) || refused.length);
+    at("results-refused").textContent = refused.join(" ");
+    const choice = /** @type {HTMLSelectElement} */ (at("result-choice"));
+    this.results.forEach(({ title, kind }, i) => (kind === "diagram" || kind === "chart") && choice.add(new Option(title, String(i))));
+    choice.hidden = choice.options.length < 2;
+    choice.value = String(this.shownResult);
+    choice.addEventListener("change", () => {
+      this.shownResult = Number(choice.value);
+      store.set({ selected: null, windows: { ...store.state.windows, result: null } });
+      this.drawAll();
+    });
+    this.addPlot(resultView(this.session, () => this.results[this.shownResult ?? -1] ?? null, this.choice));
+    this.saySelected();
+  }
+
+  saySelected() {
+    const { selected } = this.store.state;
+    const result = selected && this.results[selected.result];
+    at("orbit").textContent = selected && result ? orbitSaid(result, selected.branch, selected.point) : "";
+  }
+
+  /** Take numbers and a start from a result or a sweep. @param {Record<string, number>} numbers @param {Record<string, number>|null|undefined} start @param {number|null} periods */
+  showMotion(numbers, start, periods) {
+    const { state } = this.store;
+    const values = { ...state.values, ...numbers };
+    const begun = start ?? state.start;
+    const refused = this.tried(values, begun);
+    this.notice(refused?.message ?? "");
+    if (!refused) this.store.set({ values, start: begun, cursor: begun.time ?? 0, periods: periods ?? state.periods });
+  }
+
+  /** Let everything follow the state. */
+  follow() {
+    const { store, frame } = this;
+    store.on(["values", "start", "periods"], () => frame.before("motion", () => this.motionChanged()));
+    store.on(["cursor"], () => frame.before("cursor", () => this.cursorChanged()));
+    store.on(["hover"], () => frame.before("hover", () => this.drawOver()));
+    store.on(["windows", "coordinate"], () => frame.before("views", () => this.drawAll()));
+    store.on(["degrees", "ranges"], () => this.showFields());
+    store.on(["selected"], () => this.saySelected());
+    store.on(["theme"], () => this.applyTheme());
+    store.on(["values", "start", "periods", "cursor", "windows", "coordinate", "degrees", "ranges", "selected", "theme", "sweep", "speed"], () => this.linkLater());
+    addEventListener("resize", () => frame.before("views", () => this.drawAll()));
+    addEventListener("hashchange", () => this.hashChanged());
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.drawAll());
+    document.addEventListener("keydown", (event) => this.key(event));
+  }
+
+  motionChanged() {
+    this.session.compute();
+    this.stage.measure();
+    const motion = this.session.motion;
+    if (motion) {
+      const { cursor } = this.store.state;
+      const inside = Math.min(Math.max(cursor, motion.time.first), motion.time.last);
+      if (inside !== cursor) this.store.set({ cursor: inside });
+    }
+    this.showFields();
+    this.drawAll();
+  }
+
+  showFields() {
+    for (const field of this.fields) if (document.activeElement !== field.text || !field.element.classList.contains("refused")) field.show();
+  }
+
+  cursorChanged() {
+    this.transport.show();
+    this.stage.draw();
+    this.drawOver();
+    this.sayValidity();
+  }
+
+  drawOver() {
+    for (const { plot } of this.plots) plot.draw(true);
+  }
+
+  drawAll() {
+    this.stage.draw();
+    for (const { plot } of this.plots) plot.draw();
+    this.transport.show();
+    this.sayValidity();
+    at("summary").textContent = validityOfAll(this.session);
+  }
+
+  sayValidity() {
+    const now = validityNow(this.session, this.store.state.cursor);
+    const said = at("validity");
+    const text = [this.stage.note, now.text].filter(Boolean).join(" ");
+    if (said.textContent !== text) said.textContent = text;
+    said.dataset.kind = now.kind;
+    const flash = this.stage.flashAt(this.store.state.cursor);
+    at("impact").textContent = flash ? "impact" : "";
+  }
+
+  applyTheme() {
+    const { theme } = this.store.state;
+    if (theme === "system") delete document.documentElement.dataset.theme;
+    else document.documentElement.dataset.theme = theme;
+    this.frame.before("views", () => this.drawAll());
+  }
+
+  linkLater() {
+    clearTimeout(this.linking);
+    this.linking = setTimeout(() => this.writeLink(), 300);
+  }
+
+  writeLink() {
+    const link = linkOf(this.store.state, this.first, this.description);
+    this.written = link;
+    try {
+      history.replaceState(null, "", link ? `#${link}` : "#");
+    } catch {
+      // A browser may refuse an address of its own making in a sandboxed frame; the page works without.
+    }
+    return link;
+  }
+
+  async copyLink() {
+    this.writeLink();
+    try {
+      await navigator.clipboard.writeText(location.href);
+      this.notice("The link is copied.");
+    } catch {
+      this.notice(`The link is in the address bar.`);
+    }
+  }
+
+  hashChanged() {
+    const link = location.hash.slice(1);
+    if (link === this.written) return;
+    const found = stateOf(link, this.first, this.description);
+    if ("refusal" in found) this.notice(found.refusal);
+    else this.replaceState(tamed(found.state, this.description));
+  }
+
+  /** @param {State} state */
+  replaceState(state) {
+    const refused = this.tried(state.values, state.start);
+    this.notice(refused?.message ?? "");
+    if (!refused) this.store.set({ ...state, playing: false, hover: null });
+  }
+
+  /** @param {string} text */
+  notice(text) {
+    at("notice").textContent = text;
+    at("notice").hidden = !text;
+  }
+
+  /** Space plays; comma and full stop step; n and p go to impacts. @param {KeyboardEvent} event */
+  key(event) {
+    const target = /** @type {HTMLElement} */ (event.target);
+    if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT|TEXTAREA|SUMMARY|A)$/.test(target.tagName)) return;
+    if (target.tagName === "BUTTON" && event.key === " ") return;
+    const { transport } = this;
+    const act = { " ": () => transport.toggle(), ",": () => transport.step(-1), ".": () => transport.step(1), n: () => transport.toEvent(1), p: () => transport.toEvent(-1) }[event.key];
+    if (!act) return;
+    event.preventDefault();
+    act();
+  }
+}
+
+/** @param {any[]} results */
+function anyShown(results) {
+  return results.some(({ kind }) => kind === "diagram" || kind === "chart");
+}
+
+/** A state from a link within what the page can do. @param {State} state @param {Description} description */
+function tamed(state, description) {
+  const count = description.model.coordinates.length;
+  const coordinate = Number.isInteger(state.coordinate) && state.coordinate < count ? state.coordinate : 0;
+  const result = state.selected && description.results?.[state.selected.result];
+  const points = result?.branches?.[state.selected?.branch ?? -1]?.parameter.length ?? 0;
+  const selected = state.selected && state.selected.point < points ? state.selected : null;
+  return { ...state, coordinate, selected, periods: Math.min(Math.max(state.periods, 1e-9), MOST_PERIODS), speed: Math.min(Math.max(state.speed, 1e-3), 1e3) };
+}
+
+/** A class's name in words: WallOscillator as wall oscillator. @param {string} name */
+function spaced(name) {
+  return name.replace(/^.*:/, "").replace(/(?<=[a-z])(?=[A-Z])/g, " ").toLowerCase().replace(/^./, (letter) => letter.toUpperCase());
+}
+
+/** @param {string} id */
+function at(id) {
+  const found = document.getElementById(id);
+  if (!found) throw new Error(`the page has no element ${id}`);
+  return found;
+}
+
+/** What a parameter is called, for tests and readers. @param {string} path */
+export function nameOf(path) {
+  return parameterName(path);
+}

@@ -1,0 +1,173 @@
+/** The system and the motion that the page shows, computed from its state by the engine; and what is refused, with its sentence. */
+
+import { clamp } from "./numbers.js";
+
+/** @typedef {import("./types.js").Description} Description */
+/** @typedef {import("./types.js").Engine} Engine */
+/** @typedef {import("./types.js").Motion} Motion */
+/** @typedef {import("./types.js").State} State */
+/** @typedef {import("./types.js").NumberEntry} NumberEntry */
+
+const PER_PERIOD = 72; // samples of a forcing period for the curve in the phase plane
+const MOST_SAMPLES = 20000; // of a whole motion: more of them are no longer drawn within a frame
+export const MOST_PERIODS = 2000; // of a motion on the page, which remembers every step of it
+
+export class Session {
+  /** @param {Engine} engine @param {Description} description @param {import("./store.js").Store} store */
+  constructor(engine, description, store) {
+    this.engine = engine;
+    this.description = description;
+    this.store = store;
+    /** @type {import("./types.js").EngineSystem|null} */
+    this.system = null;
+    /** @type {Motion|null} */
+    this.motion = null;
+    /** Where a number was refused, and the sentence. @type {{where: string, message: string}|null} */
+    this.refusal = null;
+    this.curve = emptyCurve();
+  }
+
+  get coordinates() {
+    return this.description.model.coordinates;
+  }
+
+  get period() {
+    return this.system?.period ?? null;
+  }
+
+  /** How long the motion lasts, in units of time. @param {State} [state] */
+  duration(state = this.store.state) {
+    return state.periods * (this.period ?? 1);
+  }
+
+  /** Whether these numbers are accepted: null, or what the engine refuses. @param {Record<string, number>} values */
+  refusalOf(values) {
+    try {
+      this.engine.system(values);
+      return null;
+    } catch (error) {
+      return refusalFrom(error);
+    }
+  }
+
+  /** Make the system and its motion anew. */
+  compute() {
+    const state = this.store.state;
+    this.refusal = null;
+    try {
+      this.system = this.engine.system(state.values);
+      this.motion = this.engine.simulate(this.system, state.start, this.duration(state));
+      this.curve = this.sampled(this.motion);
+    } catch (error) {
+      this.refusal = refusalFrom(error);
+      this.motion = null;
+      this.curve = emptyCurve();
+    }
+  }
+
+  /** The motion along its curve: even samples, and both velocities at every event. @param {Motion} motion */
+  sampled(motion) {
+    const { first, last } = motion.time;
+    const events = motion.events;
+    const step = (this.period ?? (last - first) / 40) / PER_PERIOD;
+    const count = clamp(Math.ceil((last - first) / step), 2, MOST_SAMPLES - 2 * Math.min(events.length, MOST_SAMPLES / 4));
+    const times = new Float64Array(count + 1 + events.length);
+    let [at, next] = [0, 0];
+    for (let i = 0; i <= count; i++) {
+      const time = i === count ? last : first + ((last - first) * i) / count;
+      while (next < events.length && /** @type {any} */ (events[next]).time <= time) times[at++] = /** @type {any} */ (events[next++]).time;
+      if (at && times[at - 1] === time) continue;
+      times[at++] = time;
+    }
+    return this.withJumps(motion, times.subarray(0, at));
+  }
+
+  /** @param {Motion} motion @param {Float64Array} times */
+  withJumps(motion, times) {
+    const jumps = motion.events.filter((event) => event.kind === "impact" || event.kind === "held" || event.kind === "rest");
+    const found = motion.sample(times);
+    const size = times.length + jumps.length;
+    const names = this.coordinates.flatMap(({ name, velocity }) => [name, velocity]);
+    /** @type {Record<string, Float64Array>} */
+    const lists = Object.fromEntries(["time", ...names].map((name) => [name, new Float64Array(size)]));
+    let [at, next] = [0, 0];
+    for (let i = 0; i < times.length; i++) {
+      const time = /** @type {number} */ (times[i]);
+      const jump = jumps[next];
+      if (jump && jump.time === time) {
+        this.put(lists, at++, time, found, i, jump.before);
+        next++;
+      }
+      if (at < size) this.put(lists, at++, time, found, i, null);
+    }
+    return { time: /** @type {Float64Array} */ (lists.time).subarray(0, at), lists, length: at };
+  }
+
+  /**
+   * @param {Record<string, Float64Array>} lists @param {number} at @param {number} time
+   * @param {Record<string, Float64Array>} found @param {number} i @param {ArrayLike<number>|null} before
+   */
+  put(lists, at, time, found, i, before) {
+    /** @type {any} */ (lists.time)[at] = time;
+    this.coordinates.forEach(({ name, velocity }, k) => {
+      /** @type {any} */ (lists[name])[at] = found[name]?.[i];
+      /** @type {any} */ (lists[velocity])[at] = before ? before[k] : found[velocity]?.[i];
+    });
+  }
+
+  /** One column of the sampled curve. @param {string} name */
+  column(name) {
+    const list = this.curve.lists[name];
+    return list ? list.subarray(0, this.curve.length) : new Float64Array(0);
+  }
+
+  /** The state at a time: coordinates, then velocities. @param {number} time */
+  stateAt(time) {
+    const motion = this.motion;
+    if (!motion) return null;
+    return motion.state(clamp(time, motion.time.first, motion.time.last));
+  }
+
+  /** The stroboscopic section: the states at the ends of the forcing periods. */
+  section() {
+    const motion = this.motion;
+    if (!motion || !this.period) return null;
+    const first = Math.ceil(motion.time.first / this.period - 1e-9);
+    const last = Math.floor(motion.time.last / this.period + 1e-9);
+    const times = new Float64Array(Math.max(last - first + 1, 0)).map((_, i) =>
+      clamp((first + i) * /** @type {number} */ (this.period), motion.time.first, motion.time.last),
+    );
+    return { times, lists: motion.sample(times) };
+  }
+
+  /** A load channel's value at a time, or 0. @param {string} channel @param {number} time */
+  load(channel, time) {
+    if (this.engine.load && this.system) return this.engine.load(this.system, channel, time);
+    return plainLoad(this.description, this.store.state.values, channel, time);
+  }
+}
+
+function emptyCurve() {
+  return { time: new Float64Array(0), lists: /** @type {Record<string, Float64Array>} */ ({}), length: 0 };
+}
+
+/** @param {any} error @returns {{where: string, message: string}} */
+export function refusalFrom(error) {
+  const message = typeof error?.message === "string" ? error.message : String(error);
+  return { where: typeof error?.where === "string" ? error.where : "", message };
+}
+
+/** Constants and harmonics, by the numbers of a channel. @param {Description} description @param {Record<string, number>} values @param {string} channel @param {number} time */
+export function plainLoad(description, values, channel, time) {
+  const rate = values["load.frequency"] ?? 0;
+  let total = 0;
+  for (const entry of description.load.filter((each) => each.channel === channel)) {
+    const numbers = Object.fromEntries(entry.parameters.map((each) => [each.path.split(".").pop(), values[each.path] ?? 0]));
+    if (entry.kind === "Constant") total += values[entry.parameters[0]?.path ?? ""] ?? 0;
+    if (entry.kind === "Harmonic") {
+      const argument = (numbers.order ?? 1) * rate * time + (numbers.phase ?? 0);
+      total += (numbers.mean ?? 0) + (numbers.amplitude ?? 0) * Math.sin(argument);
+    }
+  }
+  return total;
+}
