@@ -13,7 +13,7 @@ from sphinx.ext import autosummary
 
 import saltus
 from saltus.cli.app import app
-from saltus.config.questions import QUESTIONS, functions_of, keys_of
+from saltus.config.study import QUESTIONS, functions_of, keys_of
 from saltus.systems import IMPACTS, MODELS
 
 FOLDER = Path(__file__).parents[1] / "reference" / "api"

@@ -106,7 +106,7 @@ def test_other_parameters_make_it_again(tmp_path, registry):
         ("saltus.theory.loaded_equilibria", True),
         ("saltus.flow.kernel.roots", True),
         ("saltus.systems.metainterface", True),
-        ("saltus.plots.marks", True),
+        ("saltus.plots.plane", True),
         ("saltus_paper.figures.fig09", False),
         ("saltus.plots.basins", False),  # other inner files of a room that it uses
         ("saltus.theory.rocking", False),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from saltus.attractors.lyapunov.averages import average, uncertainty, weights
+from saltus.attractors.lyapunov.growth import average, uncertainty, weights
 
 GOLDEN = (np.sqrt(5) - 1) / 2
 

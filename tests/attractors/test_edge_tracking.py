@@ -9,8 +9,7 @@ from shared_systems import forced, steady
 import saltus
 from saltus.attractors.attractor_search import Attractors, find_attractors
 from saltus.attractors.basins.basin_cells import Labelling
-from saltus.attractors.basins.boundaries import clipped, edge_saddles, edges
-from saltus.attractors.basins.grid import basins_of_attraction
+from saltus.attractors.basins.grid import basins_of_attraction, clipped, edge_saddles, edges
 from saltus.systems import Window
 
 SYSTEM = forced(W=0.88)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import saltus
-from saltus.attractors.lyapunov.averages import LYAPUNOV
-from saltus.attractors.lyapunov.growth import LargestExponents, Neighbours, stretched
+from saltus.attractors.lyapunov.growth import LYAPUNOV, LargestExponents, Neighbours, stretched
 from saltus.flow import find_recurrence
 from saltus.systems import Harmonic, Load, NewtonImpact, System, TwoLayer
 

@@ -12,8 +12,8 @@ from shared_systems import forced, steady, walled
 
 import saltus
 from saltus.attractors.basins.grid import basins_of_attraction
-from saltus.attractors.manifolds.phase_plane import saddles, separatrices
-from saltus.attractors.manifolds.saddle_manifolds import MANIFOLDS, Manifold, stable_manifold, unstable_manifold
+from saltus.attractors.phase_plane import saddles, separatrices
+from saltus.attractors.saddle_manifolds import MANIFOLDS, Manifold, stable_manifold, unstable_manifold
 from saltus.errors import ParameterError
 from saltus.systems.reversed import reversed_load, reversed_system
 from saltus.theory import equilibria, wall_orbits

@@ -9,7 +9,7 @@ from shared_systems import forced, walled
 import saltus
 from saltus import ParameterError
 from saltus.attractors import Reason, classify, excludes_tori, zero_one_test
-from saltus.attractors.orbit_certificate import certify
+from saltus.attractors.stroboscopic_section import certify
 from saltus.flow import Ending, EventKind, find_recurrence
 from saltus.systems import state_of
 from saltus.theory import equilibria

@@ -7,7 +7,7 @@ import pytest
 
 from saltus import ParameterError
 from saltus.attractors import zero_one_test
-from saltus.attractors.zero_one import _displacement, zero_one_of_bands
+from saltus.attractors.nonperiodic import _displacement, zero_one_of_bands
 
 
 def logistic(rate, count, start=0.3, skip=200):

@@ -8,7 +8,7 @@ import typer
 from typer.testing import CliRunner
 
 from saltus import ParameterError
-from saltus.cli import added_commands
+from saltus.cli import app as added_commands
 
 
 def greet(name: str, loud: bool = False) -> None:

@@ -5,7 +5,7 @@ import math
 import pytest
 import tomli_w
 
-from saltus.config.questions import QUESTIONS, keys_of
+from saltus.config.study import QUESTIONS, keys_of
 
 SYSTEM = {
     "model": {"type": "Metainterface", "beta0": 1.4, "damping": 0.1},

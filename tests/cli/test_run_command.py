@@ -17,7 +17,7 @@ from saltus.plots import figure_of
 from saltus.plots.chart import draw_stability_chart
 from saltus.studies import stability_chart
 from saltus.sweep import open_store, status
-from saltus.sweep.cluster import ClusterSettings
+from saltus.sweep.workers import ClusterSettings
 from saltus.systems import System
 from saltus.theory import equilibria
 
@@ -220,7 +220,7 @@ def test_the_store_of_another_chart_is_left_alone(saltus, refused, study, tmp_pa
     ],
 )
 def test_a_scheduler_that_is_of_no_use_is_refused(address, asks, problem, refused, study, tmp_path, monkeypatch):
-    monkeypatch.setattr("saltus.sweep.cluster.CLUSTER", ClusterSettings(patience=1.0))
+    monkeypatch.setattr("saltus.sweep.workers.CLUSTER", ClusterSettings(patience=1.0))
     assert problem in refused("run", study(FORCED + asks), "-o", tmp_path / "out", "--scheduler", address)
     assert not (tmp_path / "out").exists()
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from saltus.cli.guard import guarded
-from saltus.cli.status_command import print_status, size
+from saltus.cli.summaries import print_status, size
 from saltus.errors import SweepError
 from saltus.sweep import Plan, Variable, run
 from saltus.sweep import store_files as files

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from saltus.cli.run_command import check
 from saltus.config import load_study
-from saltus.config.questions import QUESTIONS, Ask, functions_of, keys_of
 from saltus.config.readers import read_pairs, read_values
+from saltus.config.study import QUESTIONS, Ask, functions_of, keys_of
 from saltus.errors import ParameterError
 
 KEYS = {kind: set(keys_of(kind)) for kind in QUESTIONS}

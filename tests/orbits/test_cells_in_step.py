@@ -5,7 +5,7 @@ import pytest
 
 import saltus
 from saltus.orbits import same_orbit
-from saltus.orbits.finding import near_returns
+from saltus.orbits.finding import from_motion
 from saltus.studies.diagram.branch_set import PlacedBranch, placed
 from saltus.studies.diagram.simulated import simulate_from
 
@@ -93,8 +93,8 @@ def test_maps_of_motions_one_by_one_are_those_of_lanes() -> None:
     system, rng = cells(saltus.TwoLayer), np.random.default_rng(0)
     states = np.column_stack([rng.uniform(0.05, 0.3, 6), rng.uniform(-0.3, -0.05, 6), rng.uniform(-0.2, 0.2, (6, 2))])
     values = np.linspace(0.9, 1.1, 6)
-    ends, slopes = near_returns._mapped(system, "load.frequency", values, states, 2)
-    singly = near_returns._mapped_singly(system, "load.frequency", values, states, 2)
+    ends, slopes = from_motion._mapped(system, "load.frequency", values, states, 2)
+    singly = from_motion._mapped_singly(system, "load.frequency", values, states, 2)
     np.testing.assert_allclose(singly[0], ends, rtol=0, atol=1e-7)
     np.testing.assert_allclose(singly[1], slopes, rtol=0, atol=1e-5)
     assert np.abs(slopes).max() > 0.01

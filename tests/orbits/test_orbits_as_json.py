@@ -8,7 +8,7 @@ from shared_systems import forced
 import saltus
 from saltus.errors import ParameterError
 from saltus.orbits import as_json, from_json, switch_branch
-from saltus.sweep.memo_files import packed, unpacked
+from saltus.sweep.store_files import packed, unpacked
 
 FREQUENCY = "load.frequency"
 

@@ -11,7 +11,7 @@ from shared_systems import walled
 import saltus
 from saltus.orbits import SpecialCurve, SpecialPoint
 from saltus.orbits.branches import conditions
-from saltus.orbits.branches.codimension import normal_form
+from saltus.orbits.branches.conditions import normal_form
 from saltus.orbits.branches.orbit_curve import OrbitCurve
 from saltus.orbits.branches.special_curve import SpecialCurvePoint
 from saltus.orbits.equations.one_contact import OneContactEquations

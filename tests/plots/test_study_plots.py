@@ -10,10 +10,10 @@ from matplotlib.colors import same_color
 from saltus import ParameterError
 from saltus.branch_tables import branch_tables
 from saltus.plots import figure_of
-from saltus.plots.attractors import draw_attractors
+from saltus.plots.basins import draw_attractors
 from saltus.plots.conventions import LIMIT, STABLE, UNSTABLE
-from saltus.plots.diagram import draw_diagram
 from saltus.plots.plane import draw_plane
+from saltus.plots.response import draw_diagram
 from saltus.studies import phase_portrait
 from saltus.systems import Load, Metainterface, System
 

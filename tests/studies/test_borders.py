@@ -14,7 +14,7 @@ from saltus.orbits import continue_orbit, continue_special, find_orbit, follow_s
 from saltus.studies import Borders, bordered_chart, disagreements, stability_chart, with_borders, wrong_cells
 from saltus.studies.chart.border_work import curve_dataset, explained, stability_loss
 from saltus.studies.chart.changes import ChangeOutcome, Ways, changes_of, keys_of, read_chart, trace
-from saltus.studies.chart.chart_checks import sampled_ends
+from saltus.studies.chart.chart_study import sampled_ends
 from saltus.studies.chart.motions import motion_type
 from saltus.systems import System, VelocityReduction
 from saltus.theory import high_frequency_onset, unloaded_fold

@@ -13,7 +13,7 @@ from saltus.attractors import Reason, judge
 from saltus.flow import Ending, Stop
 from saltus.orbits import orbits_near_returns, search_orbits, solved_near
 from saltus.plots.chart import draw_stability_chart
-from saltus.plots.diagram import draw_diagram
+from saltus.plots.response import draw_diagram
 from saltus.studies import bifurcation_diagram, bordered_chart, response_spectrum, stability_chart
 from saltus.studies.chart.motions import CellOutcome
 from saltus.studies.diagram.chaos_search import BandOrigin, BandSearch

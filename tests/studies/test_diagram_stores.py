@@ -26,7 +26,7 @@ from saltus.studies import response_spectrum
 from saltus.studies.diagram import diagram_work
 from saltus.studies.diagram.effort import EFFORTS, Effort
 from saltus.sweep import Memo, SweepInterrupted, memo, status
-from saltus.sweep.memo_files import unpacked
+from saltus.sweep.store_files import unpacked
 
 SCRIPT = Path(__file__).with_name("diagram_script.py")
 

@@ -8,7 +8,7 @@ import pytest
 from reference_manifolds import manifold
 from shared_systems import steady
 
-from saltus.attractors.manifolds.phase_plane import equilibria
+from saltus.attractors.phase_plane import equilibria
 from saltus.errors import ParameterError
 from saltus.studies import phase_portrait
 from saltus.systems import (

@@ -10,7 +10,7 @@ from saltus.config import load_study
 from saltus.errors import ParameterError
 from saltus.orbits import SpecialKind
 from saltus.plots import figure_of
-from saltus.plots.ensembles import draw_sweep
+from saltus.plots.motion import draw_sweep
 
 DAMPING, FORCE = 0.1, 0.2
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from saltus.errors import SweepError
-from saltus.sweep import cluster as cluster_module
 from saltus.sweep import run, status
+from saltus.sweep import workers as cluster_module
 
 distributed = pytest.importorskip("distributed")
 

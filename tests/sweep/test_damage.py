@@ -119,7 +119,7 @@ def test_a_damaged_list_of_failures_loses_nothing(store, text):
 
 
 def test_words_of_a_store_are_no_markup(tmp_path, capsys):
-    from saltus.cli.status_command import print_status
+    from saltus.cli.summaries import print_status
 
     axes, kind = {"x": np.arange(2.0)}, "[/red] [link=x]"
     plan = Plan(

@@ -5,7 +5,7 @@ import pytest
 
 from saltus.errors import SweepError
 from saltus.sweep import Memo, MemoKind, memo
-from saltus.sweep.memo_files import packed, unpacked
+from saltus.sweep.store_files import packed, unpacked
 
 SQUARES = MemoKind("squares", "test_memo:squares", chunk=3)
 FAILING = MemoKind("failing", "test_memo:failing", chunk=1)

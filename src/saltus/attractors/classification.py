@@ -12,14 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.attractors.attractor import state_plane, state_units
-from saltus.attractors.judgement import JUDGEMENT, Judged, JudgementSettings, judge
-from saltus.attractors.lyapunov.averages import LYAPUNOV
+from saltus.attractors.judgement import JUDGEMENT, Judged, JudgementSettings, Reason, judge
+from saltus.attractors.lyapunov.growth import LYAPUNOV
 from saltus.attractors.lyapunov.spectrum import Exponents, lyapunov_spectrum
-from saltus.attractors.orbit_certificate import Certificate, certify, stays_at_rest
-from saltus.attractors.reason import Reason
-from saltus.attractors.stroboscopic_section import with_clock
-from saltus.attractors.tori import excludes_tori
-from saltus.attractors.zero_one import FEWEST_ENTRIES, ZeroOne, zero_one_of_bands
+from saltus.attractors.nonperiodic import FEWEST_ENTRIES, ZeroOne, excludes_tori, zero_one_of_bands
+from saltus.attractors.stroboscopic_section import Certificate, certify, stays_at_rest, with_clock
 from saltus.checks import check_count, check_number
 from saltus.errors import MotionError
 from saltus.flow import RECURRENCE, Ending, Recurrence, find_recurrence, simulate

@@ -1,12 +1,18 @@
-"""The stroboscopic section of a system: its states at phase 0 of the load."""
+"""The stroboscopic section of a system: its states at phase 0 of the load, and the certificate that a motion that
+repeats itself there is on an attracting orbit."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 
-from saltus.errors import ParameterError
-from saltus.flow import motions_from, stroboscopic
-from saltus.systems import Load, System, check_system
+from saltus.errors import MotionError, ParameterError
+from saltus.flow import EventKind, Stop, motions_from, nearest_return, simulate, stroboscopic
+from saltus.orbits import PeriodicOrbit, Signature, equations_of, orbit_from
+from saltus.systems import Load, System, arguments_of, check_system
 
 
 def with_clock(system: System) -> System:
@@ -50,3 +56,100 @@ def is_constant(load: Load) -> bool:
 def section_states(system: System, states: np.ndarray, periods: float, tol: float = 1e-13) -> np.ndarray:
     """The states after 1, 2, ... forcing periods from states (n, d) at phase 0, (n, periods, d); or after half a period."""
     return stroboscopic(system, motions_from(system, states, periods=periods, last="all", tol=tol))
+
+
+@dataclass(frozen=True)
+class CertificateSettings:
+    """How well an orbit must agree with a motion."""
+
+    residual: float = 1e-9  # The largest residual of its equations.
+    # The largest distance of the orbit from itself after a period of direct simulation, and from the states of the motion.
+    defect: float = 1e-6
+    slow: float = 1e-3  # The largest distance from the states of a motion that approaches it slowly.
+    neutral: float = 1e-9  # A multiplier this near to 1 does not show that an orbit attracts.
+
+
+SETTINGS = CertificateSettings()
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """The orbit on which a motion is, as far as one was found, and how near it is."""
+
+    orbit: PeriodicOrbit | None
+    distance: float  # between states of the motion and of the orbit at phase 0, the nearest ones
+    within: float  # the largest distance at which the motion counts as being on the orbit
+
+    @property
+    def doubt(self) -> str | None:
+        """Why the motion is not certified to be on the orbit; None if it is."""
+        orbit = self.orbit
+        if orbit is None:
+            return "Newton's method finds no orbit there"
+        if not orbit.admissible or not orbit.residual < SETTINGS.residual:
+            return f"no admissible orbit solves the equations there (residual {orbit.residual:.1g})"
+        if orbit.grazes:
+            return "the orbit there touches the contact without speed, and has no multipliers"
+        if not orbit.stable or abs(orbit.multipliers[0]) > 1.0 - SETTINGS.neutral:
+            return f"the orbit there does not attract: its largest multiplier is {abs(orbit.multipliers[0]):.9g}"
+        if not orbit.defect < SETTINGS.defect:
+            return f"in direct simulation the orbit there misses itself by {orbit.defect:.1g}"
+        if not self.distance < self.within:
+            return f"the orbit found passes {self.distance:.1g} beside the motion"
+        return None
+
+    @property
+    def sound(self) -> bool:
+        """Whether the motion is on an attracting orbit."""
+        return self.doubt is None
+
+    @property
+    def evidence(self) -> dict[str, Any]:
+        """The numbers, by name."""
+        if self.orbit is None:
+            return {}
+        multiplier = float(abs(self.orbit.multipliers[0]))
+        return {
+            "residual": self.orbit.residual,
+            "largest_multiplier": multiplier,
+            "largest_exponent": math.log(multiplier) / self.orbit.duration if multiplier > 0.0 else -math.inf,
+            "defect": self.orbit.defect,
+            "distance": self.distance,
+            "amplitude": self.orbit.amplitude,
+            "impacts": self.orbit.impact_count,
+        }
+
+
+def certify(system: System, state: np.ndarray, period: int | None, max_period: int = 16) -> Certificate:
+    """The orbit of a motion with this state (d,) at phase 0, which repeats itself after `period` forcing periods.
+
+    Without a period, that of the nearest return within `max_period` is tried; the motion may then be farther from the orbit, as
+    it is still on its way to it.
+    """
+    later = section_states(system, state[None], period or max_period, tol=1e-12)[0]
+    states = np.concatenate([[state], later])
+    q = period or nearest_return(states[::-1], max_period)
+    orbit = solved_orbit(system, state, q, admissible=False)
+    within = SETTINGS.defect if period else SETTINGS.slow
+    if orbit is None:
+        return Certificate(None, np.inf, within)
+    apart = np.abs(states[:q] - orbit.section_state).max(axis=1)
+    return Certificate(orbit, float(apart.min()), within)
+
+
+def solved_orbit(system: System, state: np.ndarray, period: int, admissible: bool = True) -> PeriodicOrbit | None:
+    """The orbit of this period near a motion from a state (d,) at phase 0; None if Newton's method finds none."""
+    try:
+        orbit = orbit_from(equations_of(system, Signature((), 1)), arguments_of(system, state), period)
+    except MotionError:
+        return None
+    return orbit if orbit is not None and (orbit.admissible or not admissible) else None
+
+
+def stays_at_rest(system: System, state: np.ndarray) -> bool:
+    """Whether contacts or frictions hold a state (d,) at rest over a whole forcing period; it then stays, as the load repeats."""
+    if not system.model.holds_coordinates:
+        return False
+    motion = simulate(system, **arguments_of(system, state), periods=1, dense=False)
+    lets_go = (EventKind.IMPACT, EventKind.RELEASE, EventKind.SLIP)
+    return motion.stop is Stop.REST and not any(event.kind in lets_go for event in motion.events)

@@ -1,5 +1,4 @@
-"""The command line: `saltus simulate`, `run`, `plot`, `status`, `info` and `doctor`, each in the file of its name, and
-those that other packages add.
+"""The command line: `saltus simulate`, `run`, `plot`, `status`, `info` and `doctor`, and commands that other packages add.
 
 Only typer and rich are imported before a command runs, so that help is immediate.
 """

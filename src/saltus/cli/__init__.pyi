@@ -1,3 +1,3 @@
-from .drawn_progress import progress_bar as progress_bar
+from .guard import progress_bar as progress_bar
 
 def main() -> None: ...

@@ -1,4 +1,4 @@
-"""`saltus simulate` and `saltus run`: a study's motion and the answers to its questions, computed, written and drawn."""
+"""`saltus simulate`, `run` and `plot`: a study's motion and the answers to its questions, computed, written and drawn."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, SaltusError
 from saltus.progress import Progress
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ def check_scheduler(study: Study, scheduler: str) -> None:
 
 def answer(study: Study, ask: Ask, output: Path, plot: bool, scheduler: str | None) -> None:
     """Compute, write and draw the answer to one question, and print its summary."""
-    from saltus.cli.drawn_progress import progress_bar
+    from saltus.cli.guard import progress_bar
     from saltus.cli.summaries import summarise
 
     console = Console(highlight=False)
@@ -118,8 +118,6 @@ def written(ask: Ask, data: Any, output: Path, plot: bool) -> list[Path]:
         data.attrs["kind"] = ask.kind
         files = [write_dataset(output / f"{ask.kind}.nc", data)] + ([store] if ask.kind in SWEPT else [])
     if plot:
-        from saltus.cli.plot_command import draw_file
-
         files += draw_file(files[0], output / ask.kind, data)
     return files
 
@@ -144,7 +142,7 @@ def simulate_study(path: Path, output: Path | None, plot: bool) -> None:
     SaltusError
         A bad study, a folder that cannot be written to (before anything is computed), a motion that cannot go on.
     """
-    from saltus.cli.drawn_progress import progress_bar
+    from saltus.cli.guard import progress_bar
     from saltus.cli.summaries import print_summary
     from saltus.config import load_study
     from saltus.files import check_writable
@@ -199,3 +197,66 @@ def sample_times(motion: Motion, samples: int | None) -> Any:
     if motion.kept is not None or (samples is None and short):
         return None
     return np.linspace(motion.start, motion.time, SETTINGS.max_samples if samples is None else samples)
+
+
+def plot_store(path: Path, output: Path | None) -> None:
+    """Draw the result at `path` (netCDF, or the Zarr store of a sweep) beside it, or into the folder `output`.
+
+    Raises
+    ------
+    ParameterError
+        There is no result of saltus at `path`, a sweep is not complete, `output` is no folder or cannot be written to.
+    """
+    from saltus.config import open_result
+    from saltus.files import UNCHECKED, check_writable, has_checksum
+
+    folder = path.parent if output is None else output
+    if folder.suffix in (".png", ".pdf") and not folder.is_dir():
+        raise ParameterError(f"--output names a folder, in which the picture is {path.stem}.png, got {folder}")
+    check_writable(folder)
+    data = open_result(path)
+    _check_sizes(path, data)
+    files = draw_file(path, folder / path.stem, data)
+    names = ", ".join(file.name for file in files)
+    if path.is_file() and not has_checksum(path.read_bytes()):
+        Console(highlight=False, stderr=True).print(f"{path} {UNCHECKED}.", markup=False, soft_wrap=True)
+    Console(highlight=False).print(f"The picture is in {folder}: {names}", markup=False, soft_wrap=True)
+
+
+def _check_sizes(path: Path, data: Any) -> None:
+    """Refuse numbers that are too large for an axis; computations never give such numbers."""
+    import numpy as np
+
+    from saltus.checks import LIMITS
+
+    for node in getattr(data, "subtree", (data,)):
+        for name, variable in node.variables.items():
+            if variable.dtype.kind == "f" and (np.isfinite(variable.values) & (np.abs(variable.values) > LIMITS.value)).any():
+                raise ParameterError(f"{path} cannot be drawn: {name!s:.60} has numbers above {LIMITS.value:g} in size")
+
+
+def draw_file(path: Path, stem: Path, data: Any) -> list[Path]:
+    """Draw a result as `stem`.png and `stem`.pdf.
+
+    Raises
+    ------
+    ParameterError
+        The result is of no kind that has a picture, or its data do not fit its kind.
+    """
+    from saltus.config import kind_of
+    from saltus.files import write_figure
+    from saltus.plots import DRAWINGS, figure_of, style
+
+    kind = kind_of(data)
+    if kind not in DRAWINGS:
+        what = f"its kind is {kind!r}" if kind else "it does not say of what kind it is"
+        raise ParameterError(f"{path} is no result that `saltus plot` draws: {what:.60}; it draws {', '.join(DRAWINGS)}")
+    try:
+        with style():
+            return write_figure(stem, figure_of(DRAWINGS[kind](data)))
+    except OSError:
+        raise
+    except Exception as error:  # a file of another program may lack anything, or contain anything
+        said = "" if isinstance(error, SaltusError) else f"{type(error).__name__}: "
+        said += " ".join(str(error).split())
+        raise ParameterError(f"{path} says that it is of the kind {kind!r}, but it cannot be drawn ({said:.150})") from None

@@ -9,15 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from saltus.continuation.course import Course
-from saltus.continuation.end import CurveEnd, End
+from saltus.continuation.course import Course, solved_between, turning_point
+from saltus.continuation.curve import Zero
+from saltus.continuation.end import CurveEnd, CurveMissed, End, Missed
 from saltus.continuation.events import Cut, Events
-from saltus.continuation.missed import CurveMissed, Missed
-from saltus.continuation.solved_between import solved_between, turning_point
-from saltus.continuation.step_length import STEPS, StepSettings
+from saltus.continuation.predictor import STEPS, StepSettings
 from saltus.continuation.test_functions import located
 from saltus.continuation.trail import Trail, TrailPoint
-from saltus.continuation.zero import Zero
 from saltus.progress import Progress, silent
 
 Bounds = Mapping[str, tuple[float, float]]  # the least and the largest value of each parameter, by its name

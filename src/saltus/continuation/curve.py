@@ -1,4 +1,5 @@
-"""The interface of a curve to the loop of a continuation: its norm, its points, and the way from one point to the next."""
+"""The interface of a curve to the loop of a continuation: its norm, its points, and the way from one point to the next;
+and its special points, with their evidence."""
 
 from __future__ import annotations
 
@@ -9,7 +10,61 @@ from typing import Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
 
-from saltus.continuation.zero import Zero
+
+@dataclass(frozen=True)
+class Evidence:
+    """The numbers that show that a special point is there.
+
+    Attributes
+    ----------
+    residual
+        The residual of the equations.
+    brackets
+        The width in each parameter within which the test function changes its sign.
+    before
+        The test function at the beginning of the step that contains the point.
+    after
+        The test function at the end of that step.
+    value
+        The test function at the point itself.
+
+    Examples
+    --------
+    >>> fold = next(point for point in branch.special if point.kind == "LP")
+    >>> fold.evidence.bracket < 1e-9, fold.evidence.before * fold.evidence.after < 0
+    (True, True)
+    """
+
+    residual: float
+    brackets: tuple[float, ...]
+    before: float
+    after: float
+    value: float
+
+    @property
+    def bracket(self) -> float:
+        """The largest of these widths."""
+        return max(self.brackets)
+
+
+@dataclass(frozen=True, eq=False)
+class Zero:
+    """A special point of a curve: the kind of its test function, the point, and the evidence."""
+
+    kind: str
+    point: Any
+    evidence: Evidence
+
+    @property
+    def parameter(self) -> float:
+        """The first parameter."""
+        return float(self.point.parameter)
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """All parameters."""
+        return tuple(map(float, self.point.parameters))
+
 
 P = TypeVar("P", bound="Point")
 

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.continuation.curve import Zero
 from saltus.continuation.end import CurveEnd, End
 from saltus.continuation.test_functions import TestFunction, located
-from saltus.continuation.zero import Zero
 
 if TYPE_CHECKING:
     from saltus.continuation.continuation_loop import Continuation

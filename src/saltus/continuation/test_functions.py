@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from saltus.continuation.curve import Evidence, Zero
 from saltus.continuation.predictor import between
-from saltus.continuation.zero import Evidence, Zero
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,7 @@ from saltus.errors import MotionError
 from saltus.flow import Motion, SegmentColumn, Validity, simulate
 from saltus.notebook import html_table
 from saltus.orbits.equations.contract import OrbitEquations, OrbitEvaluation, Solution
-from saltus.orbits.signature import Signature
-from saltus.orbits.tolerances import TOLERANCES
+from saltus.orbits.signature import TOLERANCES, Signature
 from saltus.result import Result
 from saltus.systems import System
 

@@ -10,7 +10,7 @@ from saltus.checks import check_count
 from saltus.flow import simulate_many
 from saltus.orbits.equations.whole_motion import DYING
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.tolerances import TOLERANCES
+from saltus.orbits.signature import TOLERANCES
 from saltus.public_functions import answered
 from saltus.systems import System
 

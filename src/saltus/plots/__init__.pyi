@@ -28,12 +28,12 @@ from .conventions import shades as shades
 from .conventions import style as style
 from .conventions import styled as styled
 from .curves import draw_branch as draw_branch
-from .diagram import POINTS as POINTS
-from .marks import arrow_along as arrow_along
-from .marks import fixed_points as fixed_points
-from .marks import limit_lines as limit_lines
 from .motion import draw_motion as draw_motion
+from .motion import limit_lines as limit_lines
+from .plane import arrow_along as arrow_along
 from .plane import draw_arrows as draw_arrows
+from .plane import fixed_points as fixed_points
+from .response import POINTS as POINTS
 from .response import draw_bands as draw_bands
 from .response import draw_branches as draw_branches
 from .response import draw_critical as draw_critical

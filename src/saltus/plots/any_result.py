@@ -8,16 +8,14 @@ from typing import Any
 
 from saltus.errors import ParameterError, shown
 from saltus.notebook import show_below_cell
-from saltus.plots.attractors import draw_attractors
-from saltus.plots.basins import draw_basins, draw_uncertainty, draw_wada
+from saltus.plots.basins import draw_attractors, draw_basins, draw_uncertainty, draw_wada
 from saltus.plots.chaos import draw_chaotic_bands, draw_exponents, draw_exponents_along, draw_verdict
 from saltus.plots.chart import draw_stability_chart
 from saltus.plots.conventions import SINGLE_COLUMN, axes_or_new, figure_of, style
 from saltus.plots.curves import draw_attractors_along, draw_backbone, draw_branch, draw_cascade, draw_search, draw_special_curve
-from saltus.plots.diagram import draw_diagram
-from saltus.plots.ensembles import draw_ensemble, draw_sweep
-from saltus.plots.motion import draw_motion, draw_sensitivities
+from saltus.plots.motion import draw_ensemble, draw_motion, draw_sensitivities, draw_sweep
 from saltus.plots.plane import draw_manifold, draw_plane, draw_separatrix
+from saltus.plots.response import draw_diagram
 
 DRAWINGS: dict[str, Callable[..., Any]] = {
     "attractors": draw_attractors,

@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from saltus.errors import ParameterError
-from saltus.plots.axis_names import parameter_name, plane_of, state_label, symbol, unit_in_brackets, varied
 from saltus.plots.conventions import (
     DOUBLE_COLUMN,
     FAINT,
@@ -21,14 +20,19 @@ from saltus.plots.conventions import (
     STABLE_LINE,
     UNSTABLE_LINE,
     axes_or_new,
+    cell_edges,
     drawing,
     legend_of,
     new_figure,
     outside_legend,
+    parameter_name,
+    plane_of,
+    state_label,
+    symbol,
+    unit_in_brackets,
+    varied,
 )
-from saltus.plots.diagram import draw_stroboscopic_states
-from saltus.plots.marks import cell_edges
-from saltus.plots.response import BAND_NAMES, BANDS, draw_bands
+from saltus.plots.response import BAND_NAMES, BANDS, draw_bands, draw_stroboscopic_states
 
 NAME = r"exponent $\lambda$ (per unit of $\tau$)"
 ZERO: dict[str, Any] = {"color": INK, "linewidth": 0.5, "zorder": 1}

@@ -13,10 +13,22 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import Normal, Stroke
 
-from saltus.plots.axis_names import is_flat, parameter_name, peak, unit_in_brackets
 from saltus.plots.branch_cuts import border_curves
-from saltus.plots.conventions import INK, LIMIT, SINGLE_COLUMN, UNSTABLE, axes_or_new, drawing, legend_of, outside_legend
-from saltus.plots.marks import cell_edges
+from saltus.plots.conventions import (
+    INK,
+    LIMIT,
+    SINGLE_COLUMN,
+    UNSTABLE,
+    axes_or_new,
+    cell_edges,
+    drawing,
+    is_flat,
+    legend_of,
+    outside_legend,
+    parameter_name,
+    peak,
+    unit_in_brackets,
+)
 
 COLOURS = "viridis_r"  # large amplitudes are dark; small ones are light, as they lie beside the white of rest
 # Steps of the colours of the amplitude, as shares of a round number: finer where amplitudes are small.

@@ -9,8 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from saltus.plots.attractors import attractor_colours
-from saltus.plots.axis_names import parameter_name, peak, quantity_name, symbol, unit_in_brackets
+from saltus.plots.basins import attractor_colours
 from saltus.plots.branch_cuts import smooth_lines
 from saltus.plots.conventions import (
     DOUBLE_COLUMN,
@@ -25,6 +24,11 @@ from saltus.plots.conventions import (
     marks_of,
     new_figure,
     outside_legend,
+    parameter_name,
+    peak,
+    quantity_name,
+    symbol,
+    unit_in_brackets,
 )
 from saltus.plots.response import MARK_NAMES, MARKS, line_handles, line_style
 

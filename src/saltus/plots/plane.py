@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from saltus.plots.axis_names import plane_of, state_label, symbol, unit_in_brackets
 from saltus.plots.conventions import (
     FAINT,
     INK,
@@ -23,8 +22,11 @@ from saltus.plots.conventions import (
     drawing,
     legend_of,
     marks_of,
+    plane_of,
+    state_label,
+    symbol,
+    unit_in_brackets,
 )
-from saltus.plots.marks import arrow_along, fixed_points
 
 ARROWS = 0.6  # window widths between arrows along a motion
 
@@ -166,3 +168,27 @@ def draw_separatrix(dataset: Any, *, ax: Axes | None = None, width: float = SING
     marks = marks_of(ax)
     ax.legend(marks.values(), marks.keys(), loc="best")
     return ax
+
+
+def fixed_points(ax: Any, theta: np.ndarray, stable: np.ndarray, size: float = 4.5) -> None:
+    """Equilibria on the axis theta' = 0: filled blue where stable, open red where unstable."""
+    theta, stable = np.asarray(theta), np.asarray(stable, dtype=bool)
+    common: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": size, "zorder": 6, "clip_on": False}
+    ax.plot(theta[stable], 0 * theta[stable], markerfacecolor=STABLE, markeredgecolor=STABLE, **common)
+    ax.plot(theta[~stable], 0 * theta[~stable], markerfacecolor="white", markeredgecolor=UNSTABLE, markeredgewidth=1.0, **common)
+
+
+def arrow_along(ax: Any, x: np.ndarray, y: np.ndarray, at: int, color: str, size: float = 7.0) -> None:
+    """An arrow head on the curve (x, y) at its sample `at`, pointing along it."""
+    after = min(at + 1, len(x) - 1)
+    before = after - 1
+    if not np.isfinite([x[before], x[after], y[before], y[after]]).all():
+        return
+    ax.annotate(
+        "",
+        xy=(x[after], y[after]),
+        xytext=(x[before], y[before]),
+        arrowprops={"arrowstyle": "-|>,head_width=0.24,head_length=0.48", "color": color, "lw": 0, "mutation_scale": size},
+        zorder=5,
+        annotation_clip=True,
+    )

@@ -8,7 +8,6 @@ import numpy as np
 from matplotlib.patches import Circle, Polygon
 
 from saltus.plots.conventions import INK, LIMIT, SEPARATRIX, STABLE, UNSTABLE
-from saltus.plots.marks import arc, dimension
 
 BAR = "#5f6b76"
 FORCE = UNSTABLE
@@ -196,3 +195,29 @@ def _xy(x: float, y: float) -> np.ndarray:
 
 def _leader() -> dict[str, Any]:
     return {"arrowstyle": "-", "color": INK, "lw": 0.5, "shrinkA": 1, "shrinkB": 0}
+
+
+def dimension(ax: Any, start: np.ndarray, end: np.ndarray, label: str, offset: float = 0.0, shift: float = 0.05) -> None:
+    """A dimension line from `start` to `end`, moved sideways by `offset`, with its label beside the middle."""
+    start, end = np.asarray(start, float), np.asarray(end, float)
+    along = (end - start) / np.linalg.norm(end - start)
+    side = np.array([-along[1], along[0]])
+    a, b = start + offset * side, end + offset * side
+    for foot, tip in ((start, a), (end, b)):
+        if offset:
+            ax.plot(*zip(foot, tip + 0.3 * shift * np.sign(offset) * side, strict=True), color=INK, lw=0.4)
+    style = {"arrowstyle": "<|-|>,head_width=0.12,head_length=0.3", "color": INK, "lw": 0.5, "shrinkA": 0, "shrinkB": 0}
+    ax.annotate("", xy=b, xytext=a, arrowprops=style)
+    ax.text(*((a + b) / 2 + np.sign(offset or 1) * shift * side), label, ha="center", va="center")
+
+
+def arc(
+    ax: Any, centre: np.ndarray, radius: float, first: float, last: float, label: str, reach: float = 1.35, at: float = 0.5
+) -> None:
+    """An arc of an angle from direction `first` to `last` (rad), its label at `reach` radii and the share `at` of the angle."""
+    angles = np.linspace(first, last, 60)
+    ax.plot(centre[0] + radius * np.cos(angles), centre[1] + radius * np.sin(angles), color=INK, lw=0.6)
+    middle = first + at * (last - first)
+    ax.text(
+        centre[0] + reach * radius * np.cos(middle), centre[1] + reach * radius * np.sin(middle), label, ha="center", va="center"
+    )

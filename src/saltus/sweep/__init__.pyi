@@ -1,5 +1,4 @@
 from .chunks import Failure as Failure
-from .cluster import on_cluster as on_cluster
 from .execution import SweepInterrupted as SweepInterrupted
 from .execution import check_run as check_run
 from .execution import run as run
@@ -17,3 +16,4 @@ from .store_status import damage as damage
 from .store_status import read_plan as read_plan
 from .store_status import status as status
 from .workers import Workers as Workers
+from .workers import on_cluster as on_cluster

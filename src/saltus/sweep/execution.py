@@ -220,7 +220,7 @@ class _SweepRun:
 def outcomes(plan: Computation, queue: deque[Index], workers: int | Workers | None, scheduler: str | None) -> Any:
     """Take chunks from the queue until it is empty, and yield the outcome of each, in any order."""
     if scheduler is not None:
-        from saltus.sweep.cluster import on_cluster
+        from saltus.sweep.workers import on_cluster
 
         return on_cluster(plan, queue, scheduler)
     if isinstance(workers, int):

@@ -25,7 +25,7 @@ from saltus.files import checked_content, sealed, write_durably
 from saltus.progress import Progress, silent
 from saltus.sweep.chunks import Index, Raised
 from saltus.sweep.execution import SweepInterrupted, outcomes
-from saltus.sweep.memo_files import FOLDER, SUFFIX, files_of, packed, unpacked
+from saltus.sweep.store_files import FOLDER, SUFFIX, files_of, packed, unpacked
 
 if TYPE_CHECKING:
     from saltus.sweep.workers import Workers

@@ -18,7 +18,7 @@ from saltus.files import parsed_json
 from saltus.public_functions import answered
 from saltus.sweep import store_files as files
 from saltus.sweep.chunks import ChunkGrid, Failure, Index
-from saltus.sweep.memo_files import memo_status
+from saltus.sweep.store_files import memo_status
 
 CODECS = {"bytes", "zstd", "crc32c"}  # as a store is made
 NAMED = 3  # damaged files that a sentence names

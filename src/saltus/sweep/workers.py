@@ -1,17 +1,23 @@
-"""Chunks computed by other processes of this machine."""
+"""Chunks computed by other processes of this machine, or by the workers of a Dask cluster.
+
+Results are sent to this process, which writes them: the machines need no common disk, and only one process ever writes.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import multiprocessing
 import signal
+import time
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from saltus.errors import SweepError
 from saltus.sweep.chunks import Computation, Index, Raised, attempt
+from saltus.sweep.store_files import deferred_interrupts
 
 READY = "ready"
 
@@ -121,3 +127,88 @@ def _work(connection: Connection) -> None:
         connection.send(READY)
         while True:
             connection.send(attempt(*connection.recv()))
+
+
+@dataclass(frozen=True)
+class ClusterSettings:
+    """How long to wait for a cluster, and how many chunks it gets at once."""
+
+    patience: float = 5.0  # The time given to the scheduler to answer, and again to have a worker, s.
+    poll: float = 0.01  # The time between two checks for results and interrupts, s.
+    ahead: int = 2  # Chunks for each of the cluster's threads: one in work and one waiting; more would only fill memory.
+
+
+CLUSTER = ClusterSettings()
+
+
+def on_cluster(plan: Computation, queue: deque[Index], address: str) -> Iterator[tuple[Index, Any]]:
+    """Compute the chunks in the queue on the cluster at `address`, and yield the outcome of each as it comes.
+
+    A chunk whose worker dies is given to another by the scheduler. The workers need saltus and the plan's function, in the same
+    versions as here.
+
+    Raises
+    ------
+    SweepError
+        `distributed` is not installed, the scheduler does not answer or goes away, or it has no workers.
+    """
+    client = _connect(address)
+    try:
+        from distributed import as_completed
+
+        done = as_completed(loop=client.loop, with_results=True, raise_errors=False)
+        flying: dict[str, Index] = {}
+        with deferred_interrupts() as raise_if_interrupted:
+            while queue or flying:
+                raise_if_interrupted()
+                while queue and len(flying) < max(CLUSTER.ahead, CLUSTER.ahead * sum(client.nthreads().values())):
+                    index = queue.popleft()
+                    # Not pure: otherwise Dask would keep the error of a failed chunk, and not try it again.
+                    future = client.submit(attempt, plan.function, plan.arguments, plan.block(index), pure=False)
+                    flying[future.key] = index
+                    done.add(future)
+                while not done.has_ready():
+                    raise_if_interrupted()
+                    time.sleep(CLUSTER.poll)
+                future, result = next(done)
+                if isinstance(result, BaseException):  # the status may be out of date if a worker was lost; the result is not
+                    raise OSError("the task was given up")
+                yield flying.pop(future.key), Raised(_reason(result)) if future.status == "error" else result
+                del future, result  # so that the cluster forgets them
+            raise_if_interrupted()
+    except OSError as error:
+        raise SweepError(
+            f"the Dask scheduler at {address} has gone away ({_first_line(error)}); run the same again to go on"
+        ) from error
+    finally:
+        with contextlib.suppress(Exception):
+            client.close(timeout=1)
+
+
+def _connect(address: str) -> Any:
+    try:
+        from distributed import Client
+    except ImportError:
+        raise SweepError('a Dask cluster needs the package distributed: pip install "saltus[cluster]"') from None
+    try:
+        client = Client(address, timeout=CLUSTER.patience, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise SweepError(
+            f"no Dask scheduler answers at {address} ({_first_line(error)}); is it running, and reachable?"
+        ) from error
+    try:
+        client.wait_for_workers(1, timeout=CLUSTER.patience)
+    except TimeoutError:
+        client.close(timeout=1)
+        raise SweepError(f"the Dask scheduler at {address} has no workers; start some with `dask worker {address}`") from None
+    return client
+
+
+def _reason(result: Any) -> str:
+    """An error of the cluster itself in words, such as a chunk whose workers died repeatedly."""
+    error = result[1] if isinstance(result, tuple) else result
+    return f"{type(error).__name__}: {_first_line(error)}"
+
+
+def _first_line(error: Any) -> str:
+    return next(iter(str(error).splitlines()), type(error).__name__)

@@ -4,11 +4,12 @@ from .bouncing import reciprocal as reciprocal
 from .bouncing import unloaded_half_periods as unloaded_half_periods
 from .bouncing import unloaded_peak_ratio as unloaded_peak_ratio
 from .bouncing import unloaded_period as unloaded_period
-from .high_frequency import high_frequency_onset as high_frequency_onset
 from .impact_oscillator import WallOrbit as WallOrbit
 from .impact_oscillator import WallOrbits as WallOrbits
 from .impact_oscillator import wall_orbits as wall_orbits
+from .layer import AmplitudeLimit as AmplitudeLimit
 from .layer import Layer as Layer
+from .layer import amplitude_limits as amplitude_limits
 from .layer import layers as layers
 from .layer import open_layer as open_layer
 from .layer import potential_energy as potential_energy
@@ -21,8 +22,6 @@ from .loaded_equilibria import divergence as divergence
 from .loaded_equilibria import equilibria as equilibria
 from .loaded_equilibria import linear_equilibria as linear_equilibria
 from .loaded_equilibria import undeformed_stability as undeformed_stability
-from .mechanism_limits import AmplitudeLimit as AmplitudeLimit
-from .mechanism_limits import amplitude_limits as amplitude_limits
 from .piecewise_linear import LinearMotion as LinearMotion
 from .piecewise_linear import linear_motion as linear_motion
 from .quasi_static import QuasiStaticBorder as QuasiStaticBorder
@@ -50,6 +49,7 @@ from .small_vibrations import Vibration as Vibration
 from .small_vibrations import decayed_amplitude as decayed_amplitude
 from .small_vibrations import decayed_period as decayed_period
 from .small_vibrations import final_time as final_time
+from .small_vibrations import high_frequency_onset as high_frequency_onset
 from .small_vibrations import linear_period as linear_period
 from .small_vibrations import pendulum_acceleration as pendulum_acceleration
 from .small_vibrations import short_period as short_period

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.attractors.lyapunov.averages import LYAPUNOV, Estimate, check_run, first_frame, resolution, span_count
+from saltus.attractors.lyapunov.growth import LYAPUNOV, Estimate, check_run, first_frame, resolution, span_count
 from saltus.attractors.lyapunov.spectrum import impact_factor
 from saltus.enumerations import flags
 from saltus.errors import ParameterError

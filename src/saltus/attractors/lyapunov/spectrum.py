@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.attractors.lyapunov.averages import (
+from saltus.attractors.lyapunov.growth import (
     LYAPUNOV,
     Estimate,
     average,

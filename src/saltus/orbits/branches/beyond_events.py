@@ -19,16 +19,14 @@ from saltus.continuation import Bounds, Corrected, Course, CurveEnd, Cut, End, E
 from saltus.errors import SaltusError
 from saltus.flow import EventCode
 from saltus.orbits.branches.beyond_rest import as_the_motion_goes_on
-from saltus.orbits.branches.bifurcations import FLIP
-from saltus.orbits.branches.images import is_image, nearest, parent_of
-from saltus.orbits.branches.orbit_curve import OrbitPoint
+from saltus.orbits.branches.orbit_curve import FLIP, OrbitPoint
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint
+from saltus.orbits.branches.symmetry import is_image, nearest, parent_of
 from saltus.orbits.equations.contract import Restart
 from saltus.orbits.equations.event_sequence import SETTINGS as EVENTS
-from saltus.orbits.equations.event_sequence import EventSequence, OrbitEvent
-from saltus.orbits.equations.read_events import section_of
+from saltus.orbits.equations.event_sequence import EventSequence, OrbitEvent, section_of
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.tolerances import TOLERANCES
+from saltus.orbits.signature import TOLERANCES
 
 Events = tuple[OrbitEvent, ...]
 TINY = float(np.finfo(float).tiny)  # replaces a distance of 0 before a change of events, to keep the test function negative there

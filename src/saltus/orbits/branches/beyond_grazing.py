@@ -9,12 +9,10 @@ import numpy as np
 
 from saltus.continuation import End
 from saltus.flow import SegmentColumn
-from saltus.orbits.branches.bifurcations import grazing
-from saltus.orbits.branches.orbit_curve import OrbitPoint
+from saltus.orbits.branches.orbit_curve import OrbitPoint, grazing
 from saltus.orbits.branches.special_point import OrbitEnd
 from saltus.orbits.equations.contract import OrbitEquations
-from saltus.orbits.signature import Signature
-from saltus.orbits.tolerances import TOLERANCES
+from saltus.orbits.signature import TOLERANCES, Signature
 
 PROBES: tuple[float, ...] = tuple(
     10.0 ** -np.arange(2, 12.0)

@@ -11,11 +11,10 @@ import numpy as np
 from saltus.continuation import End
 from saltus.flow import SegmentEnd, SegmentExtremes, SegmentPlan
 from saltus.orbits.branches.beyond_grazing import admissible_direction
-from saltus.orbits.branches.images import full_point, half_point
 from saltus.orbits.branches.orbit_curve import OrbitPoint
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind
-from saltus.orbits.signature import ModeChange, Signature
-from saltus.orbits.tolerances import TOLERANCES
+from saltus.orbits.branches.symmetry import full_point, half_point
+from saltus.orbits.signature import TOLERANCES, ModeChange, Signature
 from saltus.systems import System
 
 AFTER_RELEASE = 3  # power of the time with which the gap grows after a release

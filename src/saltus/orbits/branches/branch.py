@@ -1,24 +1,33 @@
-"""A branch of periodic orbits along one parameter: its points, its special points and why it ends."""
+"""A branch of periodic orbits along one parameter: its points, its special points and why it ends; the dataset that
+keeps it without loss, and its orbits read back from that."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_number
-from saltus.continuation import Course, End
+from saltus.checks import check_dataset, check_number
+from saltus.continuation import NEWTON, Course, End
+from saltus.errors import ParameterError
 from saltus.notebook import html_table
 from saltus.orbits.branches.orbit_curve import OrbitPoint
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialPoint
+from saltus.orbits.equations.contract import OrbitEquations
+from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.orbit import PeriodicOrbit
+from saltus.orbits.signature import ModeChange, Signature
+from saltus.provenance import check_provenance, provenance
+from saltus.public_functions import answered
 from saltus.result import Result
+from saltus.systems import System
 
 if TYPE_CHECKING:
     import xarray
 
+    from saltus.orbits.branches.special_point import SpecialPoint
 
 START = End(OrbitEnd.START)
 
@@ -83,9 +92,7 @@ class Branch(Result, Course[OrbitPoint, SpecialPoint]):
         return [point.orbit for point in self.solved_at(value)]
 
     def to_xarray(self) -> xarray.Dataset:
-        """The branch as a dataset, see `branch_dataset.py`."""
-        from saltus.orbits.branches.branch_dataset import branch_dataset
-
+        """The branch as a dataset, see `branch_dataset`."""
         return branch_dataset(self)
 
     def _repr_html_(self) -> str:
@@ -103,3 +110,209 @@ class Branch(Result, Course[OrbitPoint, SpecialPoint]):
         missed = f"; not located: {', '.join(map(str, self.missed))}" if self.missed else ""
         ends = f"ends: {self.ends[0]} | {self.ends[1]}"
         return f"Branch({span}, {len(self.points)} points, special: {kinds or 'none'}; {ends}{missed})"
+
+
+def branch_dataset(branch: Branch) -> xarray.Dataset:
+    """The dataset of a branch: points along `point`, special points along `special`.
+
+    `stable` and `symmetric` are 0 or 1; `unknowns` and `sides` are those of each orbit (see `equations/`), padded with nan and
+    0 to one length. Orbits that rest also have the times of their `releases` and `rests`. The attributes hold, for both ends, the
+    sentence (`ends`), the reason as a word (`end_reasons`) and the kind of the special point there, if any (`end_kinds`).
+    """
+    import xarray
+
+    orbits = branch.orbits
+    equations = orbits[0].equations
+    data: dict[str, Any] = {"parameter": ("point", branch.parameters, {"long_name": branch.path})}
+    data |= {name: ("point", values, attrs) for name, values, attrs in _columns(orbits)}
+    data |= multiplier_columns(orbits) | solution_columns(orbits) | _special(branch.special) | _rests(orbits)
+    attributes: dict[str, Any] = {
+        "kind": "branch",
+        "path": branch.path,
+        "coordinate": " ".join(equations.system.model.coordinates),
+        "ends": [str(end) for end in branch.ends],
+        "end_reasons": [end.reason.code for end in branch.ends],
+        "end_kinds": [str(end.kind) for end in branch.ends],
+        "origin": str(branch.origin),
+        "closed": int(branch.closed),
+        "missed": "; ".join(map(str, branch.missed)),
+    }
+    return xarray.Dataset(data, attrs=provenance(equations.system, tol=equations.tol, **attributes))
+
+
+def _columns(orbits: list[PeriodicOrbit]) -> list[tuple[str, np.ndarray, dict[str, str]]]:
+    """The quantities that are one number for each orbit."""
+    model = orbits[0].equations.system.model
+    angle, coordinate = {"units": model.unit_of(model.coordinates[0])}, " or ".join(model.coordinates)
+
+    def column(value: Any, kind: Any = float) -> np.ndarray:
+        return np.array([value(orbit) for orbit in orbits], dtype=kind)
+
+    columns = [
+        ("amplitude", column(lambda o: o.amplitude), {**angle, "long_name": f"max abs({coordinate})"}),
+        ("highest", column(lambda o: o.highest), {**angle, "long_name": f"max {coordinate}"}),
+        ("lowest", column(lambda o: o.lowest), {**angle, "long_name": f"min {coordinate}"}),
+        ("stable", column(lambda o: o.stable, np.int8), {}),
+        ("impact_count", column(lambda o: o.impact_count, int), {"long_name": "impacts in one period of the orbit"}),
+        ("slowest", column(lambda o: o.slowest), {"long_name": "least speed of an impact"}),
+        ("clearance", column(lambda o: o.clearance), {"long_name": "least inner minimum of the gap"}),
+        ("residual", column(lambda o: o.residual), {}),
+        ("rest_share", column(lambda o: o.rest_share), {}),
+    ]
+    for name in orbits[0].equations.margins:
+        attrs = {"long_name": f"least {name}", "margin_kind": str(model.margin_kind(name))}
+        columns.append((f"margin_{name}", column(lambda o, name=name: o.margins[name]), attrs))
+    return columns
+
+
+def _rests(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
+    """Releases and rests of orbits that rest, in rows of one length."""
+    width = max(len(orbit.releases) for orbit in orbits)
+    if not width:
+        return {}
+
+    def rows(name: str) -> np.ndarray:
+        return np.array([np.pad(getattr(o, name), (0, width - len(o.releases)), constant_values=np.nan) for o in orbits])
+
+    return {name: (("point", "rest"), rows(name)) for name in ("releases", "rests")}
+
+
+def multiplier_columns(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
+    """The multipliers of each orbit, in rows of one length."""
+    every = [orbit.multipliers for orbit in orbits]  # their number varies: what contacts hold has none
+    values = np.array([np.pad(one, (0, max(map(len, every)) - len(one))) for one in every])
+    dims = ("point", "multiplier")
+    return {"multiplier_real": (dims, values.real), "multiplier_imag": (dims, values.imag)}
+
+
+def solution_columns(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
+    """The signature of each orbit and the unknowns of its equations, in rows of one length, as `orbits_of` reads them."""
+    width = max(orbit.equations.size for orbit in orbits)
+    unknowns = np.full((len(orbits), width), np.nan)
+    sides = np.zeros((len(orbits), max(1, max(len(orbit.signature.sides) for orbit in orbits))), dtype=np.int8)
+    for row, side, orbit in zip(unknowns, sides, orbits, strict=True):
+        row[: orbit.equations.size] = orbit.solution.unknowns
+        side[: len(orbit.signature.sides)] = orbit.signature.sides
+    data: dict[str, Any] = {
+        "unknowns": (("point", "unknown"), unknowns),
+        "sides": (("point", "impact"), sides),
+        "symmetric": ("point", np.array([orbit.symmetric for orbit in orbits], dtype=np.int8)),
+        "period": (
+            "point",
+            np.array([orbit.period for orbit in orbits]),
+            {"long_name": "forcing periods in one period of the orbit"},
+        ),
+        "side": (
+            "point",
+            np.array([orbit.signature.side for orbit in orbits], dtype=np.int8),
+            {"long_name": "side of an orbit without impacts"},
+        ),
+    }
+    events = np.full((len(orbits), max(1, max(len(orbit.signature.events) for orbit in orbits)), 3), -1)
+    for table, orbit in zip(events, orbits, strict=True):
+        for row, event in zip(table, orbit.signature.events, strict=False):
+            row[:] = event.is_impact, event.contact, event.closed
+    closed = np.array([orbit.signature.closed for orbit in orbits])
+    sections = np.array([np.nan if orbit.signature.section is None else orbit.signature.section for orbit in orbits])
+    return data | {
+        "section": ("point", sections),
+        "events": (("point", "event_mark"), events.reshape(len(orbits), -1)),
+        "closed_contacts": ("point", closed),
+    }
+
+
+def _special(special: tuple[SpecialPoint, ...]) -> dict[str, Any]:
+    """The special points with their evidence."""
+    rows: dict[str, list[Any]] = {
+        "kind": [str(s.kind) for s in special],
+        "special_parameter": [s.parameter for s in special],
+        "special_amplitude": [s.amplitude for s in special],
+        "special_highest": [s.orbit.highest for s in special],
+        "special_lowest": [s.orbit.lowest for s in special],
+        "special_slowest": [s.orbit.slowest for s in special],
+        "special_impact_count": [s.orbit.impact_count for s in special],
+        "special_period": [s.orbit.period for s in special],
+        "special_residual": [s.evidence.residual for s in special],
+        "bracket": [s.evidence.bracket for s in special],
+        "test_before": [s.evidence.before for s in special],
+        "test_after": [s.evidence.after for s in special],
+        "test_value": [s.evidence.value for s in special],
+        "special_defect": [s.defect for s in special],
+    }
+    return {name: ("special", np.array(values, dtype=_dtype(name))) for name, values in rows.items()}
+
+
+def _dtype(name: str) -> type:
+    """The type of a column of special points, which NumPy cannot tell if the column has no rows."""
+    return str if name == "kind" else int if name in ("special_impact_count", "special_period") else float
+
+
+NEEDED = ("parameter", "unknowns")
+
+
+@answered
+def orbits_of(dataset: xarray.Dataset) -> list[PeriodicOrbit]:
+    """The orbits along `point` of a dataset that `Branch.to_xarray` or `SpecialCurve.to_xarray` made, bit for bit, in order.
+
+    The equations are evaluated at the kept unknowns, which must solve them. `continue_orbit` can go on from
+    each of these orbits.
+
+    Parameters
+    ----------
+    dataset
+        The dataset that `to_xarray` of a branch or a curve gave.
+
+    Raises
+    ------
+    ParameterError
+        The dataset is of another kind, of other equations than the model has now, or of another version of saltus; its
+        unknowns do not solve the equations; or the model is the user's own and not registered (`saltus.register`).
+
+    Examples
+    --------
+    >>> again = saltus.orbits.orbits_of(branch.to_xarray())
+    >>> again[0].amplitude == branch.orbits[0].amplitude
+    True
+    """
+    check_dataset(dataset, "a branch or a curve of special points", NEEDED, ("system", "tol"))
+    system, tol = System.from_json(dataset.attrs["system"]), float(dataset.attrs["tol"])
+    check_provenance(dataset.attrs, system, "the dataset of these orbits")
+    paths = tuple(map(str, dataset["path"].values)) if "path" in dataset.coords else (str(dataset.attrs["path"]),)
+    values = np.atleast_2d(dataset["parameter"].values.T).T
+    known: dict[Signature, OrbitEquations] = {}
+    orbits = []
+    for signature, row, value in zip(_signatures(dataset), dataset["unknowns"].values, values, strict=True):
+        if signature not in known:
+            known[signature] = equations_of(system, signature, paths, tol)
+        orbits.append(_orbit(known[signature], row, value))
+    return orbits
+
+
+def _signatures(dataset: xarray.Dataset) -> list[Signature]:
+    """The signature of each orbit."""
+    columns = (dataset[name].values for name in ("sides", "period", "symmetric", "side"))
+    signatures = [_signature(*row) for row in zip(*columns, strict=True)]
+    changes = [
+        tuple(ModeChange(bool(k), int(i), int(c)) for k, i, c in table.reshape(-1, 3) if k >= 0)
+        for table in dataset["events"].values
+    ]
+    more = zip(signatures, changes, dataset["closed_contacts"].values, dataset["section"].values, strict=True)
+    return [
+        replace(signature, events=events, closed=int(closed), section=None if np.isnan(section) else float(section))
+        for signature, events, closed, section in more
+    ]
+
+
+def _signature(sides: np.ndarray, periods: Any, symmetric: Any, side: Any) -> Signature:
+    """The signature in one row of the dataset, where the sides are padded with 0."""
+    return Signature(tuple(int(s) for s in sides if s), int(periods), bool(symmetric), int(side))
+
+
+def _orbit(equations: OrbitEquations, row: np.ndarray, value: np.ndarray) -> PeriodicOrbit:
+    values = value.astype(float)
+    orbit = PeriodicOrbit.known(equations, row[: equations.size].copy(), values)
+    scale = max(1.0, float(np.abs(row[: equations.size]).max()))
+    if orbit is None or not orbit.residual <= max(NEWTON.stalled * scale, equations.residual_floor):
+        error = "its motion cannot be followed" if orbit is None else f"its residual is {orbit.residual:.1e}"
+        raise ParameterError(f"what is kept at {equations.paths[0]} = {values[0]:g} is no orbit ({error}): the data are damaged")
+    return orbit

@@ -1,26 +1,32 @@
-"""Following orbits along one parameter, through folds and grazings."""
+"""Following orbits along one parameter, through folds and grazings, and from there the branches that are born on the way."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from saltus.checks import check_bounds, check_step
 from saltus.continuation import STEPS, Continuation, End, Watch, both_ways
 from saltus.errors import ParameterError, shown
 from saltus.orbits.branches.branch import START, Branch
 from saltus.orbits.branches.branch_events import BranchEvents
-from saltus.orbits.branches.images import full_period, half
 from saltus.orbits.branches.orbit_curve import OrbitPoint, start
-from saltus.orbits.branches.special_point import SpecialKind, UserFunction
+from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint, UserFunction
+from saltus.orbits.branches.symmetry import full_period, half, keeps_symmetry
+from saltus.orbits.equations.contract import OrbitEquations
 from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.finding.from_motion import orbit_near
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
-from saltus.orbits.symmetry import keeps_symmetry
 from saltus.progress import Progress, silent
+from saltus.result import Result, result_dataset
 from saltus.systems import check_along, check_path
+
+if TYPE_CHECKING:
+    import xarray
 
 STEP = STEPS.longest  # the longest step: a thirtieth of the parameter's range, or a tenth of a radian and of a unit of speed
 # To a nearby value of the parameter a single step may go all the way, and change phases and speeds by 1.
@@ -144,3 +150,199 @@ def _in_other_equations(orbit: PeriodicOrbit, path: str) -> PeriodicOrbit | None
     position, velocity = orbit.state
     state = {orbit.system.model.coordinates[0]: position, "velocity": velocity}
     return orbit_near(equations_of(orbit.system, Signature((), 1), (path,)), state, orbit.period)
+
+
+MOST_DOUBLED = 64  # forcing periods of an orbit: periods double six times
+
+
+def switch_branch(
+    special: SpecialPoint,
+    bounds: tuple[float, float],
+    *,
+    functions: dict[str, UserFunction] | None = None,
+    step: float = STEP,
+    both: bool = True,
+    progress: Progress = silent,
+) -> tuple[Branch, ...]:
+    """The branches that begin at a special point of another branch.
+
+    At a PD this is the branch of the doubled orbit. At a BPC these are the branches of the two unsymmetric orbits, which are
+    mirror images of one another, or, where two branches cross, the two halves of the other branch.
+
+    Parameters
+    ----------
+    special
+        Where to begin.
+    bounds, functions, step
+        As for `continue_orbit`.
+    both
+        Whether both of two branches of mirror images are followed, whose orbits differ in phase and sign only.
+    progress
+        Called at every point with the fraction of the range that is done.
+
+    Raises
+    ------
+    ParameterError
+        No branch begins at this special point.
+
+    Examples
+    --------
+    >>> unsymmetric = system.with_({"load.horizontal.amplitude": 1.4})
+    >>> one = saltus.find_orbit(unsymmetric, theta=0.3)
+    >>> path = saltus.continue_orbit(one, "load.horizontal.amplitude", (1.35, 1.55))
+    >>> breaking = next(point for point in path.special if point.kind == "BPC")
+    >>> [new.orbits[-1].symmetric for new in saltus.switch_branch(breaking, (1.35, 1.55))]
+    [False, False]
+    """
+    check_step(step)
+    bounds = check_bounds(bounds)
+    if special.kind not in (SpecialKind.PD, SpecialKind.BPC):
+        raise ParameterError(
+            f"no branch begins at a {special.kind}; switch at a PD or a BPC (grazings are gone through anyway)", "special"
+        )
+    if special.kind == SpecialKind.PD:
+        starts: tuple[OrbitPoint | None, ...] = (_doubled(special.point),)
+    elif special.orbit.symmetric:
+        starts = _unsymmetric(special.point)[: 2 if both else 1]
+    else:
+        starts = _crossing_branch(special.point)
+    origin, begun = _origin(special), [start for start in starts if start is not None]
+    return tuple(follow_from(start, bounds, origin, functions, step, progress=progress) for start in begun)
+
+
+def _origin(special: SpecialPoint) -> End:
+    return End(OrbitEnd.BORN, special.parameter, special.kind)
+
+
+def _kernel(matrix: np.ndarray) -> np.ndarray:
+    vector: np.ndarray = np.linalg.svd(matrix)[2][-1]
+    return vector
+
+
+def _doubled(point: OrbitPoint) -> OrbitPoint | None:
+    """The orbit gone round twice, and the direction in which the two rounds differ."""
+    equations, signature = point.orbit.equations, point.orbit.signature
+    if 2 * signature.period > MOST_DOUBLED:
+        return None
+    direction = equations.alternating(_kernel(point.evaluation.jacobian(-1.0)))
+    return _along(point, equations.with_signature(signature.repeated()), equations.repeated(point.solution.unknowns), direction)
+
+
+def _unsymmetric(point: OrbitPoint) -> tuple[OrbitPoint | None, ...]:
+    """The symmetric orbit over its full period, and the two directions in which its halves differ."""
+    orbit = full_period(point.orbit)
+    direction = point.orbit.equations.alternating(_kernel(point.evaluation.jacobian(-1.0)))
+    return tuple(_along(point, orbit.equations, orbit.solution.unknowns, sign * direction) for sign in (1.0, -1.0))
+
+
+def _along(point: OrbitPoint, equations: OrbitEquations, unknowns: np.ndarray, direction: np.ndarray) -> OrbitPoint | None:
+    """The first point of the new branch, to be followed in a direction of the unknowns."""
+    curve, tangent = point.curve.with_equations(equations), np.append(direction, 0.0)
+    known = curve.known(unknowns, point.parameters)
+    return None if known is None else curve.point_at(known, tangent / curve.norm(tangent))
+
+
+def _crossing_branch(point: OrbitPoint) -> tuple[OrbitPoint | None, ...]:
+    """The two halves of the other branch at a crossing: both ways along the direction in the two-dimensional kernel that is
+    orthogonal to the branch's own."""
+    curve = point.curve
+    own = point.tangent * curve.weights
+    kernel = np.linalg.svd(point.evaluation.derivatives() / curve.weights)[2][-2:]
+    other = kernel[int(np.argmin(np.abs(kernel @ own)))]
+    other = other - (other @ own) * own
+    tangent = other / curve.weights
+    first = replace(point, tangent=tangent / curve.norm(tangent))
+    return first, first.turned()
+
+
+@dataclass(frozen=True)
+class Cascade(Result):
+    """A cascade of period doublings, with the ratios of their distances, which tend to Feigenbaum's 4.6692.
+
+    Attributes
+    ----------
+    points
+        The period doublings, in order.
+
+    Examples
+    --------
+    >>> [field for field in ("parameters", "ratios") if hasattr(saltus.orbits.Cascade, field)]
+    ['parameters', 'ratios']
+    """
+
+    points: tuple[SpecialPoint, ...]
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """The parameters at which the period doubles, from q to 2 q, 4 q, ..."""
+        return np.array([point.parameter for point in self.points])
+
+    @property
+    def periods(self) -> np.ndarray:
+        """The periods of the orbits that double."""
+        return np.array([point.orbit.period for point in self.points])
+
+    @property
+    def ratios(self) -> np.ndarray:
+        """(p_{n+1} - p_n) / (p_{n+2} - p_{n+1})."""
+        steps = np.diff(self.parameters)
+        return np.asarray(steps[:-1] / steps[1:])
+
+    def to_xarray(self) -> xarray.Dataset:
+        """`parameter`, `period` and `amplitude` of the doublings over `doubling`, and their `ratio` over `step`."""
+        orbit, path = self.points[0].orbit, self.points[0].orbit.equations.paths[0]
+        name = orbit.system.model.coordinates[0]
+        amplitudes = [point.amplitude for point in self.points]
+        columns: dict[str, tuple[Any, ...]] = {
+            "parameter": ("doubling", self.parameters, "1", path),
+            "period": ("doubling", self.periods, "1", "forcing periods of the orbits that double"),
+            "amplitude": ("doubling", amplitudes, orbit.system.model.unit_of(name), f"max abs({name})"),
+            "ratio": ("step", self.ratios, "1", "(p_{n+1} - p_n) / (p_{n+2} - p_{n+1}), which tends to 4.6692"),
+        }
+        return result_dataset("cascade", columns, None, orbit.system, path=path)
+
+
+def doubling_cascade(first: SpecialPoint, bounds: tuple[float, float], *, max_period: int = 32, step: float = STEP) -> Cascade:
+    """The period doublings that follow a first one, each on the branch born at its predecessor, up to `max_period` forcing
+    periods.
+
+    The cascade ends earlier if a doubled branch has no further doubling within the bounds.
+
+    Parameters
+    ----------
+    first
+        The first period doubling (PD).
+    bounds
+        The values of the parameter between which branches are followed.
+    max_period
+        The longest period, in forcing periods.
+    step
+        The longest step along a branch.
+
+    Raises
+    ------
+    ParameterError
+        The special point is no PD.
+
+    Examples
+    --------
+    >>> unsymmetric = system.with_({"load.horizontal.amplitude": 1.6})
+    >>> one = saltus.find_orbit(unsymmetric, theta=0.3)
+    >>> path = saltus.continue_orbit(one, "load.horizontal.amplitude", (1.55, 1.75))
+    >>> first = next(point for point in path.special if point.kind == "PD")
+    >>> saltus.doubling_cascade(first, (1.6, 1.8), max_period=4).parameters.round(6)
+    array([1.684394, 1.742241, 1.750439])
+    """
+    check_step(step)
+    if first.kind != SpecialKind.PD:
+        raise ParameterError(f"a cascade begins at a PD, not at a {first.kind}", "first")
+    bounds, points = check_bounds(bounds), [first]
+    while 2 * points[-1].orbit.period <= max_period:
+        start = _doubled(points[-1].point)
+        if start is None:
+            break
+        branch = follow_from(start, bounds, _origin(points[-1]), None, step, until=SpecialKind.PD)
+        if branch.ends[1].reason is not OrbitEnd.FIRST:
+            break
+        points.append(branch.special[-1])
+    return Cascade(tuple(points))

@@ -11,8 +11,19 @@ import numpy as np
 from saltus.continuation import Continuation, Corrected, Cut, End, Events, Missed, Zero, located
 from saltus.errors import SaltusError
 from saltus.flow import simulate
-from saltus.orbits.branches.bifurcations import FLIP, Test, branch_tests, complex_pair, grazing, never_torus
-from saltus.orbits.branches.images import (
+from saltus.orbits.branches.orbit_curve import (
+    FLIP,
+    SHRUNK_TO_REST,
+    STEEPEST,
+    OrbitPoint,
+    Test,
+    branch_tests,
+    complex_pair,
+    grazing,
+    never_torus,
+)
+from saltus.orbits.branches.special_point import OrbitEnd, OrbitMissed, SpecialKind, UserFunction
+from saltus.orbits.branches.symmetry import (
     beside_image,
     falls_onto_image,
     nearest,
@@ -20,13 +31,10 @@ from saltus.orbits.branches.images import (
     passes_image,
     repetition,
 )
-from saltus.orbits.branches.orbit_curve import SHRUNK_TO_REST, STEEPEST, OrbitPoint
-from saltus.orbits.branches.special_point import OrbitEnd, OrbitMissed, SpecialKind, UserFunction
 from saltus.orbits.equations.contract import Restart
 from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.finding.from_motion import orbit_from
-from saltus.orbits.signature import Signature
-from saltus.orbits.tolerances import TOLERANCES
+from saltus.orbits.signature import TOLERANCES, Signature
 from saltus.systems import arguments_of
 
 Run = Continuation

@@ -9,7 +9,7 @@ import numpy as np
 
 from saltus.continuation import Corrected, Course
 from saltus.errors import ParameterError
-from saltus.orbits.branches.branch_dataset import multiplier_columns, solution_columns
+from saltus.orbits.branches.branch import multiplier_columns, solution_columns
 from saltus.orbits.branches.conditions import Condition, ConditionValue, Slow
 from saltus.orbits.branches.orbit_curve import OrbitCurve, OrbitPoint
 from saltus.orbits.branches.special_point import SpecialPoint

@@ -13,16 +13,14 @@ from saltus.continuation import STEPS, Continuation, Cut, End, TestFunction, bot
 from saltus.errors import ParameterError
 from saltus.orbits.branches.branch_continuation import STEP
 from saltus.orbits.branches.branch_events import OrbitEvents
-from saltus.orbits.branches.codimension import curve_tests
-from saltus.orbits.branches.conditions import Condition, Singular, Slow
-from saltus.orbits.branches.images import divide, half
+from saltus.orbits.branches.conditions import Condition, Singular, Slow, curve_tests
 from saltus.orbits.branches.special_curve import ConditionedCurve, SpecialCurve, SpecialCurvePoint, without_condition
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint
+from saltus.orbits.branches.symmetry import divide, half, keeps_symmetry
 from saltus.orbits.equations.contract import OrbitEquations
 from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.symmetry import keeps_symmetry
-from saltus.orbits.tolerances import TOLERANCES
+from saltus.orbits.signature import TOLERANCES
 from saltus.progress import Progress, silent
 from saltus.systems import check_path, check_system
 

@@ -28,14 +28,12 @@ from saltus.flow import (
     SegmentPlan,
 )
 from saltus.orbits.branches.beyond_switching import AFTER_RELEASE, bounces, contact_change, other_events_side
-from saltus.orbits.branches.bifurcations import GRAZING, curve_test, grazing
-from saltus.orbits.branches.images import full_point
-from saltus.orbits.branches.orbit_curve import OrbitPoint
+from saltus.orbits.branches.orbit_curve import GRAZING, OrbitPoint, curve_test, grazing
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind
+from saltus.orbits.branches.symmetry import full_point
 from saltus.orbits.equations.contract import MotionToRead, OrbitEquations, OrbitEvaluation, Solution
-from saltus.orbits.equations.read_events import STAYS, read_signature
-from saltus.orbits.signature import ModeChange, Signature
-from saltus.orbits.tolerances import TOLERANCES
+from saltus.orbits.equations.event_sequence import STAYS, read_signature
+from saltus.orbits.signature import TOLERANCES, ModeChange, Signature
 from saltus.systems import System, arguments_of, image_of
 from saltus.taylor import FREQUENCY
 

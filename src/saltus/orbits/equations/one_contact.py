@@ -24,13 +24,11 @@ import numpy as np
 from saltus.continuation import Cut, End, TestFunction, Zero
 from saltus.flow import ContactRegularity, EventKind, SegmentValue, contact_regularity, load_segments
 from saltus.orbits.branches.beyond_grazing import inserted, other_side
-from saltus.orbits.branches.bifurcations import GRAZING, curve_test
-from saltus.orbits.branches.codimension import room
-from saltus.orbits.branches.orbit_curve import OrbitPoint
+from saltus.orbits.branches.conditions import room
+from saltus.orbits.branches.orbit_curve import GRAZING, OrbitPoint, curve_test
 from saltus.orbits.branches.special_point import SpecialKind
 from saltus.orbits.equations.contract import MotionToRead, OrbitEquations, OrbitEvaluation, Solution
-from saltus.orbits.signature import Signature
-from saltus.orbits.tolerances import TOLERANCES
+from saltus.orbits.signature import TOLERANCES, Signature
 from saltus.systems import System, arguments_of, state_of
 from saltus.taylor import FREQUENCY
 

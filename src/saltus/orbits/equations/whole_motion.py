@@ -44,12 +44,11 @@ from saltus.orbits.branches.beyond_events import (
     stalled_at,
 )
 from saltus.orbits.branches.beyond_rest import last_release
-from saltus.orbits.branches.images import nearest
 from saltus.orbits.branches.orbit_curve import STEEPEST, OrbitPoint
 from saltus.orbits.branches.special_point import OrbitEnd
+from saltus.orbits.branches.symmetry import nearest
 from saltus.orbits.equations.contract import MotionToRead, OrbitEquations, OrbitEvaluation, Restart, Solution
-from saltus.orbits.equations.event_sequence import EventSequence, sequence_of
-from saltus.orbits.equations.read_events import STAYS, section_of
+from saltus.orbits.equations.event_sequence import STAYS, EventSequence, section_of, sequence_of
 from saltus.orbits.equations.sampled_motion import SampledMotion
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature

@@ -11,7 +11,7 @@ import numpy as np
 from saltus.checks import check_count, check_starts
 from saltus.errors import ParameterError
 from saltus.flow import Recurrence, find_recurrence
-from saltus.orbits.finding.near_returns import orbits_near_returns, solved_near
+from saltus.orbits.finding.from_motion import orbits_near_returns, solved_near
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.verify import same_orbit
 from saltus.progress import Progress, silent

@@ -1,25 +1,221 @@
-"""Stability charts: the stable motions beside rest, in the plane of two parameters, and their borders."""
+"""Stability charts: the stable motions beside rest, in the plane of two parameters, their borders, and checks
+of charts by other means."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_count
+from saltus.attractors import share_interval
+from saltus.checks import check_count, check_dataset
 from saltus.progress import Progress, part_of, silent
-from saltus.public_functions import checked_by
-from saltus.studies.chart.borders import with_borders
-from saltus.studies.chart.changes import read_chart
-from saltus.studies.chart.chart_checks import disagreements
+from saltus.public_functions import answered, checked_by
+from saltus.studies.chart.border_work import explained, special_point, unseen_folds
+from saltus.studies.chart.borders import Borders, with_borders
+from saltus.studies.chart.cells import computed
+from saltus.studies.chart.changes import COUNTS, ENDS, ChangeOutcome, ChartMotions, changes_of, read_chart
 from saltus.studies.chart.chart_request import ChartRequest
+from saltus.studies.chart.motions import ALIKE, KEPT, CellOutcome, has_alike, read_motions
 from saltus.systems import Box, System, check_system
 from saltus.theory import quasi_static_border
 
 if TYPE_CHECKING:
     import xarray
+
+SAMPLE = 60  # ends that are solved for
+MARGIN = 0.02  # cells by which an end may lie outside its enclosure, as motions near their end settle slowly
+
+
+def sampled_ends(
+    system: System, paths: tuple[str, str], chart: ChartMotions, borders: Borders, count: int = SAMPLE
+) -> np.ndarray:
+    """For a sample of the motions that end between two cells, (n,): 1 if continuation of the orbit from the middle of its cell
+    finds the special point where simulation has enclosed the end, 0 if elsewhere, nan if it finds none."""
+    changes = changes_of(chart)
+    found = borders.of(chart, changes)
+    rows = np.flatnonzero(np.isin(found["outcome"], ENDS))
+    chosen = rows[np.unique(np.linspace(0, len(rows) - 1, min(count, len(rows))).astype(int))] if len(rows) else rows
+    result = np.full(len(chosen), np.nan)
+    axes = (chart.horizontal, chart.vertical)
+    for i, k in enumerate(chosen):
+        source, target, motion = changes.source[k], changes.target[k], chart.motions[changes.motion[k]]
+        along = 0 if source[0] == target[0] else 1
+        axis, here, there = axes[along], source[1 - along], target[1 - along]
+        place = [float(axes[n][source[1 - n]]) for n in (0, 1)]
+        start = {"state": motion["state"], "period": motion["period"], "place": place, "along": along, "goal": axis[there]}
+        special = special_point(system, paths, start)
+        if special is not None:
+            share = (special.parameter - axis[here]) / (axis[there] - axis[here])
+            low, high = found["settled"][k] - MARGIN, found["next"]["share"][k] + MARGIN
+            result[i] = low <= share <= high
+    return result
+
+
+@answered
+def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
+    """Where chart and curves do not agree, away from the cells through which the curves run.
+
+    Parameters
+    ----------
+    chart
+        A chart as `stability_chart` or `with_borders` returns it.
+    borders
+        Its borders, as `with_borders` returns them.
+
+    Returns
+    -------
+    xarray.Dataset
+        A Dataset. Along `change` it has the changes for which it is not known what becomes of the motion, and which no curve
+        explains: `horizontal` and `vertical` halfway between the cells, `amplitude` and `period` of the motion that ends, `cells`
+        (the number of motions in its family), and `beside_rest`, whether the neighbour has rest alone. Along `unseen` it has the
+        places on curves of folds beside which no cell has the motions that end there. Attributes: `changes` and
+        `changes_beside_rest` count all changes; `located` counts those with an enclosed end of the motion, `on_curves` those that
+        a curve explains, `harmless` those where the same motion goes on, with another amplitude than expected or too small to
+        count. `sampled` is the number of located ends that were also solved for by continuation, `sampled_agree` the number of
+        these that lie where simulation has enclosed them. `chaos_beside_rest` counts pairs of neighbouring cells, one with rest
+        alone and one with chaos alone, between which chaos ends but no stable motion.
+
+    Examples
+    --------
+    >>> chart = saltus.stability_chart(system, horizontal=[0.2, 0.21], vertical=[-0.5, -0.49], starts=4)
+    >>> chart, borders = saltus.studies.with_borders(system, chart)
+    >>> saltus.studies.disagreements(chart, borders).attrs["located"]
+    0
+    """
+    import xarray as xr
+
+    check_dataset(chart, "stability_chart", ("vertical", "horizontal", "count", "amplitude"), ("least",), name="chart")
+    cells = read_chart(chart)
+    changes = changes_of(cells)
+    found = borders.of(cells, changes)
+    kinds = [ChangeOutcome(outcome) for outcome in found["outcome"]]
+    ends, harmless = (np.array([getattr(k, name) for k in kinds], dtype=bool) for name in ("is_end", "is_harmless"))
+    on_curves = explained(cells, changes, borders.curves) & ~harmless
+    left = changes.only(~(on_curves | ends | harmless))
+    middle, unseen = (left.source + left.target) / 2, unseen_folds(cells, borders.curves)
+    columns = {
+        "amplitude": cells.motions["amplitude"][left.motion],
+        "period": cells.motions["period"][left.motion],
+        "cells": cells.family_size[left.motion],
+        "beside_rest": cells.monostable[tuple(left.target.T)],
+    }
+    data = {name: ("change", values) for name, values in columns.items()}
+    for i, (name, axis) in enumerate((("vertical", cells.vertical), ("horizontal", cells.horizontal))):
+        data[name] = ("change", np.interp(middle[:, i], np.arange(len(axis)), axis))
+        data[f"unseen_{name}"] = ("unseen", np.interp(unseen[:, i], np.arange(len(axis)), axis))
+    chaos = (chart["outcome"] == CellOutcome.CHAOS).transpose("vertical", "horizontal").values
+    path = chart.attrs["path"]
+    sample = sampled_ends(System.from_json(chart.attrs["system"]), (str(path[0]), str(path[1])), cells, borders)
+    attrs = {
+        "changes": len(changes),
+        "changes_beside_rest": int(cells.monostable[tuple(changes.target.T)].sum()),
+        "located": int(ends.sum()),
+        "on_curves": int(on_curves.sum()),
+        "sampled": int(np.isfinite(sample).sum()),
+        "sampled_agree": int(np.nansum(sample)),
+        "harmless": int(harmless.sum()),
+        "chaos_beside_rest": _neighbours(chaos, cells.monostable),
+    }
+    return xr.Dataset(data, attrs=attrs)
+
+
+def _neighbours(some: np.ndarray, others: np.ndarray) -> int:
+    """The number of pairs of neighbouring cells of which one is among `some` and the other among `others`."""
+    pairs = ((some[1:], others[:-1]), (some[:-1], others[1:]), (some[:, 1:], others[:, :-1]), (some[:, :-1], others[:, 1:]))
+    return int(sum((a & b).sum() for a, b in pairs))
+
+
+MORE = 4  # times as many starts
+CHAOTIC = (CellOutcome.CHAOS, CellOutcome.MOTIONS_AND_CHAOS)
+
+
+@answered
+def wrong_cells(system: System, chart: xarray.Dataset, *, cells: int = 100, seed: int = 1) -> dict[str, float]:
+    """How many cells of a random sample are wrong.
+
+    Each cell is computed again with four times as many starts, which are others, and with eight cells around it at half the
+    distance of its neighbours, so that motions that begin at these are found as well.
+
+    Parameters
+    ----------
+    system
+        The system of the chart.
+    chart
+        A chart as `stability_chart` or `with_borders` returns it.
+    cells
+        The number of cells in the sample; all cells if the chart has fewer.
+    seed
+        The seed of the sample and of the starts.
+
+    Returns
+    -------
+    dict[str, float]
+        The number of `checked_cells` and of `wrong_cells` among them. The latter are `wrong_rest` where the chart has rest alone
+        and there is something else, `wrong_motions` where it lacks a stable motion, and `wrong_chaos` where either the chart or
+        the sample has chaos, but not both. `wrong_share` is the share of wrong cells, and `wrong_share_low` to `wrong_share_high`
+        its 95 % interval.
+
+    Examples
+    --------
+    >>> chart = saltus.stability_chart(system, horizontal=[0.2, 0.21], vertical=[-0.5, -0.49], starts=4)
+    >>> saltus.studies.wrong_cells(system, chart, cells=4)["wrong_share"]
+    0.0
+    """
+    check_count("cells", cells, 1)
+    check_count("seed", seed, 0)
+    request, chart = ChartRequest.of_chart(system, chart), chart.transpose("vertical", "horizontal", ...)
+    size = int(np.prod(request.shape))
+    chosen = np.sort(np.random.default_rng(seed).choice(size, min(cells, size), replace=False))
+    finer = _Sample(**_numbers(request, seed), place=np.stack(np.unravel_index(chosen, request.shape), axis=1))
+    columns, found = computed(finer)
+    middle = 9 * np.arange(len(chosen)) + 4
+    motions = found[(found["amplitude"] > COUNTS * request.least) & np.isin(found["cell"], middle)]
+    motions["cell"] = chosen[motions["cell"] // 9]
+    known, full = read_motions(chart), chart["count"].values.ravel()[motions["cell"]] >= KEPT
+    lacking = motions["cell"][~full & ~has_alike(known, motions["cell"], motions, ALIKE.followed)]
+    before, after = chart["outcome"].values.ravel()[chosen], columns["outcome"][middle]
+    wrong = {
+        "wrong_rest": (before == CellOutcome.REST) & (after != CellOutcome.REST),
+        "wrong_motions": np.isin(chosen, lacking),
+        "wrong_chaos": np.isin(before, CHAOTIC) != np.isin(after, CHAOTIC),
+    }
+    number = int(np.any(list(wrong.values()), axis=0).sum())
+    low, high = share_interval(number, len(chosen))
+    counts = {"checked_cells": len(chosen), "wrong_cells": number, **{name: int(cells.sum()) for name, cells in wrong.items()}}
+    return counts | {"wrong_share": number / len(chosen), "wrong_share_low": low, "wrong_share_high": high}
+
+
+def _numbers(request: ChartRequest, seed: int) -> dict[str, Any]:
+    """The arguments of a chart with more and with other starts."""
+    more = replace(request, starts=MORE * request.starts, seed=request.seed + seed)
+    return {name: getattr(more, name) for name in more.__dataclass_fields__}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Sample(ChartRequest):
+    """Some cells of a chart, each in the middle of a block of three by three cells half as far apart."""
+
+    place: np.ndarray  # (n, 2): row and column in the chart
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """All blocks below one another; starts from a neighbour that belongs to another block do no harm."""
+        return 3 * len(self.place), 3
+
+    @property
+    def parameters(self) -> dict[str, np.ndarray]:
+        """The values of both parameters in each cell, by their dotted paths."""
+        steps = np.array([-0.5, 0.0, 0.5])
+        rows, columns = (
+            np.interp(index[:, None] + steps, np.arange(len(axis)), axis)
+            for index, axis in zip(self.place.T, (self.vertical, self.horizontal), strict=True)
+        )
+        return {self.paths[1]: np.repeat(rows, 3, axis=1).ravel(), self.paths[0]: np.tile(columns, 3).ravel()}
+
 
 HORIZONTAL, VERTICAL = np.linspace(0.0, 0.5, 101), np.linspace(-2.0, 0.0, 101)  # the axes where none are given
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.attractors.manifolds.saddle_manifolds import PLANE, has_left
+from saltus.attractors.saddle_manifolds import PLANE, has_left
 from saltus.attractors.stroboscopic_section import check_periodic
 from saltus.checks import check_number
 from saltus.errors import ParameterError
