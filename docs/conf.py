@@ -38,6 +38,7 @@ autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
 python_use_unqualified_type_names = True
 maximum_signature_line_length = 100
+toc_object_entries_show_parents = "hide"  # the contents at the right are narrow
 napoleon_google_docstring = False
 napoleon_use_rtype = False
 napoleon_custom_sections = [("Attributes", "params_style")]  # of results, whose fields are shown as arguments are
@@ -57,6 +58,7 @@ sphinx_gallery_conf = {
     "abort_on_example_error": True,
     "only_warn_on_example_error": False,
     "min_reported_time": 5,
+    "thumbnail_size": (580, 420),
     "write_computation_times": False,  # whose pages would load scripts from elsewhere
     "nested_sections": False,
     "reset_modules": ("gallery_order.reset",),

@@ -2,6 +2,8 @@
 
 import matplotlib.pyplot as plt
 
+from saltus.plots.conventions import RC
+
 ORDER = (
     *(
         "quickstart",
@@ -49,6 +51,8 @@ class InOrder:
 
 
 def reset(_, __):
-    """Every example begins with Matplotlib's own settings."""
+    """Every example begins with the house's settings, with letters that can be read on a thumbnail."""
     plt.rcdefaults()
-    plt.rcParams["figure.dpi"] = 120
+    letters = {name: size + 3.0 for name, size in RC.items() if name.endswith("size") and "major" not in name}
+    plt.rcParams.update(RC | letters | {"figure.figsize": (5.6, 4.0), "figure.dpi": 100, "savefig.dpi": 140})
+    plt.rcParams["figure.constrained_layout.use"] = True

@@ -42,12 +42,44 @@ def write_all(_):
 # --- names -----------------------------------------------------------------------------------------------------------------
 
 
+# What one calls first; after these come functions, then what they give, then lists of words.
+FIRST = (
+    *(
+        "System",
+        "Load",
+        "Harmonic",
+        "Record",
+        "Metainterface",
+        "RockingBlock",
+        "PhysicalBlock",
+        "WallOscillator",
+        "TwoStops",
+        "ImpactPair",
+    ),
+    *("VelocityReduction", "NewtonImpact", "InelasticImpact", "EnergyRestitution"),
+    *("OneContactModel", "ContactModel", "Contact", "Friction", "Model"),
+    *("simulate", "simulate_many", "sensitivities", "stop_names", "Motion"),
+    *("find_orbit", "continue_orbit", "switch_branch", "continue_special", "search_orbits", "PeriodicOrbit", "Branch"),
+    *("classify", "find_attractors", "basins_of_attraction", "lyapunov_spectrum"),
+    *("response_spectrum", "bifurcation_diagram", "stability_chart", "frequency_sweep", "phase_portrait"),
+    *("run", "status", "open_store", "Plan", "Variable"),
+)
+
+
+def order_of(name):
+    """By which names of a room are sorted; those that are equal keep their order."""
+    own, found = name.rpartition(".")[2], _found(name)
+    first = FIRST.index(own) if own in FIRST else len(FIRST)
+    return first, inspect.isclass(found) and issubclass(found, enum.Enum), inspect.isclass(found)
+
+
 def room_page(room, names):
     """The names of a room: a table of them, then each with signature, types and example."""
+    names = sorted(names, key=order_of)
     lines = [ROOMS[room], "=" * len(ROOMS[room]), "", ".. autosummary::", "   :nosignatures:", ""]
     lines += [f"   ~{name}" for name in names]
     for name in names:
-        found = getattr(saltus, name.removeprefix("saltus.")) if name.count(".") == 1 else _inside(name)
+        found = _found(name)
         if inspect.isclass(found):
             lines += ["", f".. autoclass:: {name}", "   :members:"]
             if issubclass(found, enum.Enum):
@@ -59,13 +91,18 @@ def room_page(room, names):
     return "\n".join(lines) + "\n"
 
 
-def _inside(name):
+def _found(name):
+    """The object with this full name."""
+    if name.count(".") == 1:
+        return getattr(saltus, name.removeprefix("saltus."))
     room, own = name.removeprefix("saltus.").split(".")
     return getattr(getattr(saltus, room, None) or __import__(f"saltus.{room}", fromlist=["_"]), own)
 
 
 def plain_text_as_rst(_app, _what, _name, _found, _options, lines):
     """Docstrings are plain text: an indented paragraph after an empty line is an equation, stars and bars are what they are."""
+    if _what == "attribute" and lines and ":" in lines[0]:
+        lines[0] = f":{lines[0]}"  # napoleon would take the words before the colon for a type
     given, example, equation = list(lines), False, 0  # by how much the text before an equation is indented, and one
     lines.clear()
     for number, line in enumerate(given):
