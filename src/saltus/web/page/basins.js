@@ -2,7 +2,7 @@
 
 /** @typedef {import("./session.js").Session} Session */
 /**
- * @typedef {{postMessage: (message: any, transfer?: Transferable[]) => void, terminate: () => void,
+ * @typedef {{postMessage: (message: any) => void, terminate: () => void,
  *   onmessage: ((event: {data: any}) => void)|null, onerror?: ((event: any) => void)|null}} WorkerLike
  */
 /** @typedef {{name: string, period: number, amplitude: number, section: number[], cells: number}} Attractor */
@@ -33,6 +33,10 @@ export class Basins {
     this.counted = 0;
     this.done = true;
     this.refusal = "";
+    /** @type {number[]} */
+    this.queue = [];
+    this.next = 0;
+    this.periods = 0;
   }
 
   /** @param {number[]} window_ @param {number} periods */
@@ -83,13 +87,13 @@ export class Basins {
 
   /** @param {WorkerLike} worker */
   give(worker) {
-    const queue = this.queue ?? [];
-    const cells = queue.slice(this.next, (this.next ?? 0) + BATCH);
+    const { queue } = this;
+    const cells = queue.slice(this.next, this.next + BATCH);
     if (!cells.length) {
       if (this.counted >= queue.length) this.finish();
       return;
     }
-    this.next = (this.next ?? 0) + cells.length;
+    this.next = this.next + cells.length;
     const { store, coordinates } = this.session;
     const { values, coordinate } = store.state;
     const size = 2 * coordinates.length;

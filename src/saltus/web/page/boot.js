@@ -2,6 +2,7 @@
 
 import { open } from "./engine.js";
 import { Page } from "./main.js";
+import { prepared } from "./description.js";
 
 /** What stands in a data block of the page. @param {string} id */
 function block(id) {
@@ -15,7 +16,7 @@ export async function unpacked(text) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-/** A worker of the text that stands in the page. */
+/** A worker of the text that stands in the page. @returns {any} */
 function makeWorker() {
   const address = URL.createObjectURL(new Blob([block("worker")], { type: "text/javascript" }));
   const worker = new Worker(address);
@@ -26,9 +27,10 @@ function makeWorker() {
 async function boot() {
   const notice = document.getElementById("notice");
   try {
-    const description = JSON.parse(block("description"));
+    const written = JSON.parse(block("description"));
+    const description = prepared(written);
     const wasm = await unpacked(block("wasm"));
-    const engine = await open(wasm, description);
+    const engine = await open(wasm, written);
     Object.assign(globalThis, { saltusPage: new Page({ engine, description, makeWorker, wasm }) });
   } catch (error) {
     if (!notice) return;

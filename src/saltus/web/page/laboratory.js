@@ -3,11 +3,12 @@
 import { parameterName, parameterSymbol, symbolOf } from "./symbols.js";
 import { rangeOf, shortly, typedNumber } from "./numbers.js";
 import { axisName } from "./views.js";
-import { Sweep, jumpsOf } from "./sweep.js";
-import { Basins } from "./basins.js";
+import { jumpsOf } from "./sweep.js";
 import { button } from "./transport.js";
 
 /** @typedef {import("./session.js").Session} Session */
+/** @typedef {import("./sweep.js").Sweep} Sweep */
+/** @typedef {import("./basins.js").Basins} Basins */
 /** @typedef {import("./views.js").View} View */
 /** @typedef {import("./types.js").NumberEntry} NumberEntry */
 

@@ -15,7 +15,7 @@ import { BASIN_GRID, Basins } from "./basins.js";
 import { basinsLegend, basinsView, sweepControls, sweepSaid, sweepView } from "./laboratory.js";
 import { Choice, ofThisSystem, orbitSaid, paintBeneath, resultView } from "./results_view.js";
 import { currentPalette } from "./palette.js";
-import { parameterName } from "./symbols.js";
+import { entriesOf, firstState, isPeriodic, spaced, startEntries, tamed } from "./description.js";
 
 /** @typedef {import("./types.js").Description} Description */
 /** @typedef {import("./types.js").Engine} Engine */
@@ -23,28 +23,7 @@ import { parameterName } from "./symbols.js";
 /** @typedef {import("./types.js").NumberEntry} NumberEntry */
 /** @typedef {import("./views.js").View} View */
 
-const FIRST_SPEED = 4; // units of time per second
 const BASIN_PERIODS = 100; // of each motion of a basin at most
-
-/** All numbers of a system, in the order in which the page shows them. @param {Description} description */
-export function entriesOf(description) {
-  const impact = description.impact?.parameters ?? [];
-  return [...description.model.parameters, ...impact, ...description.load.flatMap(({ parameters }) => parameters)];
-}
-
-/** The state with which the page opens: the study itself. @param {Description} description @returns {State} */
-export function firstState(description) {
-  const entries = entriesOf(description);
-  const values = Object.fromEntries(entries.map(({ path, value }) => [path, value]));
-  const { simulate } = description.study;
-  const swept = entries.find(({ path }) => path === "load.frequency") ?? entries[0];
-  return {
-    values, start: { ...description.start }, periods: simulate.periods ?? simulate.duration ?? 20, cursor: description.start.time ?? 0,
-    hover: null, playing: false, speed: FIRST_SPEED, coordinate: 0, degrees: entries.some(({ angle }) => angle), theme: "system",
-    windows: {}, ranges: {}, selected: null,
-    sweep: { path: swept?.path ?? "", low: swept?.low ?? 0, high: swept?.high ?? 1, count: 61, periods: 60 },
-  };
-}
 
 /**
  * The page.
@@ -65,6 +44,9 @@ export class Page {
     this.plots = [];
     /** @type {import("./controls.js").NumberField[]} */
     this.fields = [];
+    /** @type {ReturnType<typeof setTimeout>|undefined} */
+    this.linking = undefined;
+    this.written = "";
     const { own, refused } = ofThisSystem(description.results ?? [], description.digest);
     this.results = own;
     this.session.compute();
@@ -112,29 +94,12 @@ export class Page {
     group("Model", description.model.parameters);
     group(description.impact?.name ? `Impact law: ${spaced(description.impact.name)}` : "Impact law", description.impact?.parameters ?? []);
     group("Load", description.load.flatMap(({ parameters }) => parameters));
-    group("Start", this.startEntries());
+    const starting = startEntries(description, this.first, isPeriodic(description));
+    group("Start", starting);
     const degrees = /** @type {HTMLInputElement} */ (at("degrees"));
     degrees.checked = store.state.degrees;
     degrees.addEventListener("change", () => store.set({ degrees: degrees.checked }));
-    at("degrees-row").hidden = ![...entriesOf(description), ...this.startEntries()].some(({ angle }) => angle);
-  }
-
-  /** The initial state and the duration as numbers with sliders. @returns {NumberEntry[]} */
-  startEntries() {
-    const { first, description } = this;
-    const reach = (/** @type {number} */ value) => Math.max(2, 2 * Math.abs(value));
-    const states = description.model.coordinates.flatMap(({ name, velocity, unit }) => {
-      const angle = unit === "rad";
-      const [x, v] = [first.start[name] ?? 0, first.start[velocity] ?? 0];
-      return [
-        { path: `start.${name}`, unit, value: x, low: -reach(x), high: reach(x), angle, symbol: name },
-        { path: `start.${velocity}`, unit: "1", value: v, low: -reach(v), high: reach(v), symbol: velocity },
-      ];
-    });
-    const time = { path: "start.time", unit: "1", value: first.start.time ?? 0, low: 0, high: 2 * Math.PI, symbol: "tau" };
-    const periodic = this.session.period !== null;
-    const lasting = { path: periodic ? "start.periods" : "start.duration", unit: periodic ? "T" : "1", value: first.periods, low: 1, high: Math.max(120, first.periods) };
-    return [...states, time, lasting];
+    at("degrees-row").hidden = !entriesOf(description).some(({ angle }) => angle);
   }
 
   /** @param {string} path */
@@ -154,6 +119,7 @@ export class Page {
       return null;
     }
     if (path.startsWith("start.")) {
+      /** @type {Record<string, number>} */
       const start = { ...state.start, [path.slice(6)]: value };
       const refused = this.tried(state.values, start);
       if (!refused) this.store.set({ start, selected: null, ...(path === "start.time" ? { cursor: value } : {}) });
@@ -180,6 +146,7 @@ export class Page {
   startAt(x, y) {
     const { state } = this.store;
     const chosen = /** @type {any} */ (this.description.model.coordinates[state.coordinate]);
+    /** @type {Record<string, number>} */
     const start = { ...state.start, [chosen.name]: x, [chosen.velocity]: y };
     const refused = this.tried(state.values, start);
     this.notice(refused?.message ?? "");
@@ -443,29 +410,9 @@ function anyShown(results) {
   return results.some(({ kind }) => kind === "diagram" || kind === "chart");
 }
 
-/** A state from a link within what the page can do. @param {State} state @param {Description} description */
-function tamed(state, description) {
-  const count = description.model.coordinates.length;
-  const coordinate = Number.isInteger(state.coordinate) && state.coordinate < count ? state.coordinate : 0;
-  const result = state.selected && description.results?.[state.selected.result];
-  const points = result?.branches?.[state.selected?.branch ?? -1]?.parameter.length ?? 0;
-  const selected = state.selected && state.selected.point < points ? state.selected : null;
-  return { ...state, coordinate, selected, periods: Math.min(Math.max(state.periods, 1e-9), MOST_PERIODS), speed: Math.min(Math.max(state.speed, 1e-3), 1e3) };
-}
-
-/** A class's name in words: WallOscillator as wall oscillator. @param {string} name */
-function spaced(name) {
-  return name.replace(/^.*:/, "").replace(/(?<=[a-z])(?=[A-Z])/g, " ").toLowerCase().replace(/^./, (letter) => letter.toUpperCase());
-}
-
 /** @param {string} id */
 function at(id) {
   const found = document.getElementById(id);
   if (!found) throw new Error(`the page has no element ${id}`);
   return found;
-}
-
-/** What a parameter is called, for tests and readers. @param {string} path */
-export function nameOf(path) {
-  return parameterName(path);
 }

@@ -51,6 +51,7 @@ export class Plot {
     /** @type {{x: number, y: number}|null} */
     this.cursor = null;
     this.width = 0;
+    this.ratio = 1;
     this.height = 0;
     this.stale = true;
     /** What there is to see, as it was when the picture was drawn. @type {Window|null} */
@@ -93,12 +94,12 @@ export class Plot {
     if (!onlyOver || this.stale) {
       this.all = this.options.bounds();
       const ctx = /** @type {CanvasRenderingContext2D} */ (this.base.getContext("2d"));
-      ctx.setTransform(this.ratio ?? 1, 0, 0, this.ratio ?? 1, 0, 0);
+      ctx.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
       this.paintBase(ctx, palette);
       this.stale = false;
     }
     const over = /** @type {CanvasRenderingContext2D} */ (this.top.getContext("2d"));
-    over.setTransform(this.ratio ?? 1, 0, 0, this.ratio ?? 1, 0, 0);
+    over.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
     over.clearRect(0, 0, this.width, this.height);
     const painter = this.painter(over, palette);
     if (!this.all && this.options.empty) return;

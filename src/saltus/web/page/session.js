@@ -147,6 +147,7 @@ export class Session {
   }
 }
 
+/** @returns {{time: Float64Array, lists: Record<string, Float64Array>, length: number}} */
 function emptyCurve() {
   return { time: new Float64Array(0), lists: /** @type {Record<string, Float64Array>} */ ({}), length: 0 };
 }

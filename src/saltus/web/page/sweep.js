@@ -38,6 +38,7 @@ export class Sweep {
     this.result = { up: [], down: [], done: false, refusal: "" };
     const steps = Math.max(2, Math.round(sweep.count));
     const along = Array.from({ length: steps }, (_, i) => sweep.low + ((sweep.high - sweep.low) * i) / (steps - 1));
+    /** @type {Record<string, number>} */
     let state = { ...start, time: 0 };
     let from = performance.now();
     try {

@@ -158,7 +158,7 @@ export function timeHistory(session, show) {
       const chosen = coordinateOf(session).name;
       for (const name of names()) {
         const other = { color: painter.palette.separatrix, width: 0.8 };
-        painter.curve(found.time, found[name] ?? [], name === chosen ? { color: painter.palette.stable, width: 1.3 } : other);
+        painter.curve(found.time ?? [], found[name] ?? [], name === chosen ? { color: painter.palette.stable, width: 1.3 } : other);
       }
       strokesOfImpacts(session, painter);
     },
@@ -256,7 +256,7 @@ export function stroboscopic(session, show) {
     csv: () => {
       const found = points();
       const { name, velocity } = coordinateOf(session);
-      return found ? { time: found.times, [name]: found.xs, [velocity]: found.ys } : {};
+      return found ? { time: found.times, [name]: found.xs, [velocity]: found.ys } : /** @type {Record<string, number[]>} */ ({});
     },
   };
 }
@@ -302,7 +302,7 @@ export function energyView(session, show) {
     leave: () => session.store.set({ hover: null }),
     csv: () => {
       const all = whole();
-      return all ? { time: all.times, kinetic_energy: all.found } : {};
+      return all ? { time: all.times, kinetic_energy: all.found } : /** @type {Record<string, number[]>} */ ({});
     },
   };
 }

@@ -1,0 +1,86 @@
+/** The description of a system as the page uses it: its numbers, the state with which the page opens, and states from links. */
+
+import { MOST_PERIODS } from "./session.js";
+
+/** @typedef {import("./types.js").Description} Description */
+/** @typedef {import("./types.js").State} State */
+/** @typedef {import("./types.js").NumberEntry} NumberEntry */
+
+const FIRST_SPEED = 4; // units of time per second
+
+/** What Python wrote, with every group of numbers as entries and with what may be left out filled in. @param {any} written @returns {Description} */
+export function prepared(written) {
+  const known = new Map((written.numbers ?? []).map((/** @type {NumberEntry} */ entry) => [entry.path, entry]));
+  const entries = (/** @type {(string|NumberEntry)[]} */ list) =>
+    (list ?? []).map((each) => (typeof each === "string" ? known.get(each) : each)).filter(Boolean);
+  const margins = written.model.margins ?? [];
+  const load = (written.load ?? []).map((/** @type {any} */ each) => ({ ...each, parameters: entries(each.parameters) }));
+  const frequency = known.get("load.frequency");
+  if (frequency) load.unshift({ channel: "", kind: "frequency", parameters: [frequency] });
+  return {
+    ...written,
+    model: {
+      ...written.model, parameters: entries(written.model.parameters),
+      margins: Array.isArray(margins) ? margins : Object.entries(margins).map(([name, kind]) => ({ name, kind })),
+    },
+    impact: written.impact && { ...written.impact, parameters: entries(written.impact.parameters) },
+    load, start: written.start ?? { time: 0 }, digest: written.digest ?? "",
+    study: { simulate: { periods: 20 }, system: written.system, ...written.study },
+  };
+}
+
+/** Whether the load has a period. @param {Description} description */
+export function isPeriodic(description) {
+  return entriesOf(description).some(({ path }) => path === "load.frequency");
+}
+
+/** All numbers of a system, in the order in which the page shows them. @param {Description} description */
+export function entriesOf(description) {
+  const impact = description.impact?.parameters ?? [];
+  return [...description.model.parameters, ...impact, ...description.load.flatMap(({ parameters }) => parameters)];
+}
+
+/** The state with which the page opens: the study itself. @param {Description} description @returns {State} */
+export function firstState(description) {
+  const entries = entriesOf(description);
+  const values = Object.fromEntries(entries.map(({ path, value }) => [path, value]));
+  const { simulate } = description.study;
+  const swept = entries.find(({ path }) => path === "load.frequency") ?? entries[0];
+  return {
+    values, start: { ...description.start }, periods: Math.min(simulate.periods ?? simulate.duration ?? 20, MOST_PERIODS), cursor: description.start.time ?? 0,
+    hover: null, playing: false, speed: FIRST_SPEED, coordinate: 0, degrees: entries.some(({ angle }) => angle), theme: "system",
+    windows: {}, ranges: {}, selected: null,
+    sweep: { path: swept?.path ?? "", low: swept?.low ?? 0, high: swept?.high ?? 1, count: 61, periods: 60 },
+  };
+}
+
+/** The initial state and the duration as numbers with sliders. @param {Description} description @param {State} first @param {boolean} periodic @returns {NumberEntry[]} */
+export function startEntries(description, first, periodic) {
+  const reach = (/** @type {number} */ value) => Math.max(2, 2 * Math.abs(value));
+  const states = description.model.coordinates.flatMap(({ name, velocity, unit }) => {
+    const angle = unit === "rad";
+    const [x, v] = [first.start[name] ?? 0, first.start[velocity] ?? 0];
+    return [
+      { path: `start.${name}`, unit, value: x, low: -reach(x), high: reach(x), angle, symbol: name },
+      { path: `start.${velocity}`, unit: "1", value: v, low: -reach(v), high: reach(v), symbol: velocity },
+    ];
+  });
+  const time = { path: "start.time", unit: "1", value: first.start.time ?? 0, low: 0, high: 2 * Math.PI, symbol: "tau" };
+  const lasting = { path: periodic ? "start.periods" : "start.duration", unit: periodic ? "T" : "1", value: first.periods, low: 1, high: Math.max(120, first.periods) };
+  return [...states, time, lasting];
+}
+
+/** A state from a link within what the page can do. @param {State} state @param {Description} description */
+export function tamed(state, description) {
+  const count = description.model.coordinates.length;
+  const coordinate = Number.isInteger(state.coordinate) && state.coordinate < count ? state.coordinate : 0;
+  const result = state.selected && description.results?.[state.selected.result];
+  const points = result?.branches?.[state.selected?.branch ?? -1]?.parameter.length ?? 0;
+  const selected = state.selected && state.selected.point < points ? state.selected : null;
+  return { ...state, coordinate, selected, periods: Math.min(Math.max(state.periods, 1e-9), MOST_PERIODS), speed: Math.min(Math.max(state.speed, 1e-3), 1e3) };
+}
+
+/** A class's name in words: WallOscillator as wall oscillator. @param {string} name */
+export function spaced(name) {
+  return name.replace(/^.*:/, "").replace(/(?<=[a-z])(?=[A-Z])/g, " ").toLowerCase().replace(/^./, (letter) => letter.toUpperCase());
+}
