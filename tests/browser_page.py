@@ -101,3 +101,14 @@ class BrowserPage:
         x, y = self.evaluate(place)
         for kind in ("mousePressed", "mouseReleased"):
             self("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+
+    def point(self, kind: str, x: float, y: float, **more: Any) -> None:
+        """An event of the mouse at a place of the window: `mouseMoved`, `mousePressed`, `mouseReleased` or `mouseWheel`."""
+        pressed = {"button": "left", "clickCount": 1} if kind in ("mousePressed", "mouseReleased") else {}
+        self("Input.dispatchMouseEvent", type=kind, x=x, y=y, **pressed, **more)
+
+    def type(self, selector: str, text: str) -> None:
+        """Put a text into a field and press Enter, as a reader does."""
+        self.evaluate(f"(() => {{ const e = document.querySelector({json.dumps(selector)}); e.focus(); e.select(); }})()")
+        self("Input.insertText", text=text)
+        self.press("Enter", 13)

@@ -1,0 +1,157 @@
+// What the page's modules compute, without a browser: `node --test`.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { allDigits, degreesOf, radians, roundStep, tickLabel, ticks, typedNumber } from "../../src/saltus/web/page/numbers.js";
+import { asText, symbolOf } from "../../src/saltus/web/page/symbols.js";
+import { linkOf, stateOf } from "../../src/saltus/web/page/link.js";
+import { firstState, prepared } from "../../src/saltus/web/page/description.js";
+import { cellPoints } from "../../src/saltus/web/page/cell_drawing.js";
+import { jumpsOf } from "../../src/saltus/web/page/sweep.js";
+import { runs, shade } from "../../src/saltus/web/page/results_view.js";
+import { wideEnough } from "../../src/saltus/web/page/plot.js";
+
+/** Random numbers in [0, 1) from a seed (mulberry32). */
+function random(seed) {
+  return () => {
+    seed = (seed + 0x6d2b79f5) | 0;
+    let t = Math.imul(seed ^ (seed >>> 15), 1 | seed);
+    t = (t + Math.imul(t ^ (t >>> 7), 61 | t)) ^ t;
+    return ((t ^ (t >>> 14)) >>> 0) / 4294967296;
+  };
+}
+
+const entry = (path, value) => ({ path, value, unit: "1", low: 0, high: 2 });
+const description = prepared({
+  version: 1, digest: "abc", numbers: [entry("model.damping", 0.1), entry("impact.e", 1), entry("load.force.amplitude", 0.5), entry("load.frequency", 1)],
+  model: { name: "WallOscillator", coordinates: [{ name: "x", velocity: "x_velocity", unit: "1" }], parameters: ["model.damping"], margins: { far: "limit" } },
+  impact: { name: "NewtonImpact", parameters: ["impact.e"] }, load: [{ channel: "force", kind: "Harmonic", parameters: ["load.force.amplitude"] }],
+  start: { time: 0, x: 0, x_velocity: 0 }, study: { system: {}, simulate: { periods: 20 } },
+});
+
+test("ticks are round, lie inside, and are written with the decimals of their step", () => {
+  const next = random(1);
+  for (let i = 0; i < 2000; i++) {
+    const low = (next() - 0.5) * 10 ** (12 * next() - 6);
+    const high = low + Math.max(Math.abs(low) * 1e-6, 1e-9) + next() * 10 ** (8 * next() - 4);
+    const { step, values } = ticks(low, high, 6);
+    assert.ok(values.length >= 2 && values.length <= 9, `${low} ${high} ${values}`);
+    assert.ok(["1", "2", "5"].includes(step.toExponential(0)[0]));
+    for (const value of values) assert.ok(value >= low - step * 1e-6 && value <= high + step * 1e-6);
+    assert.equal(new Set(values.map((value) => tickLabel(value, step))).size, values.length);
+  }
+  assert.equal(roundStep(0.3), 0.5);
+  assert.equal(tickLabel(-1.5, 0.5), "−1.5");
+});
+
+test("what is typed is a number with its unit, or is refused with a sentence", () => {
+  const damping = { name: "damping" };
+  const beta0 = { name: "beta0", angle: true, degrees: true };
+  assert.deepEqual(typedNumber(" −1.5e-3 ", damping), { value: -0.0015 });
+  assert.deepEqual(typedNumber("80 deg", { ...beta0, degrees: false }), { value: radians(80) });
+  assert.deepEqual(typedNumber("80", beta0), { value: radians(80) });
+  assert.deepEqual(typedNumber("1.4 rad", beta0), { value: 1.4 });
+  for (const text of ["", "abc", "1,5", "1e999", "NaN", "Infinity", "0x10", "1 deg", "1..2", "<b>1</b>"]) {
+    assert.match(typedNumber(text, damping).refusal, /^damping must be/, text);
+  }
+});
+
+test("an angle in degrees goes back to the same radians", () => {
+  const next = random(2);
+  for (let i = 0; i < 2000; i++) {
+    const degrees = Number(((next() - 0.5) * 360).toFixed(Math.floor(next() * 6)));
+    assert.equal(degreesOf(radians(degrees)), degrees);
+  }
+  assert.equal(allDigits(-0.1), "−0.1");
+});
+
+test("names are set as symbols", () => {
+  assert.equal(asText(symbolOf("theta_1")), "θ₁");
+  assert.equal(asText(symbolOf("beta0")), "β₀");
+  assert.equal(asText(symbolOf("x_velocity")), "x\u0307");
+  assert.equal(asText(symbolOf("<img src=x>")), "<img src=x>");
+});
+
+test("a link holds the whole state", () => {
+  const first = firstState(description);
+  assert.equal(linkOf(first, first, description), "");
+  const state = {
+    ...first, values: { ...first.values, "model.damping": 0.1 + 0.2, "load.frequency": 1e-7 }, start: { ...first.start, x: -1 / 3 }, periods: 33,
+    cursor: 12.345678901234567, speed: 8, degrees: !first.degrees, theme: "dark", windows: { phase: [-1, 1, -0.1, 2e-9] },
+    ranges: { "model.damping": [0, 5] }, sweep: { path: "impact.e", low: 0.1, high: 0.9, count: 11, periods: 5 }, selected: { result: 0, branch: 2, point: 17 },
+  };
+  assert.deepEqual(stateOf(linkOf(state, first, description), first, description), { state });
+  const other = stateOf(linkOf(state, first, description), first, { ...description, digest: "another" });
+  assert.match(other.refusal, /another page/);
+});
+
+test("of 10 000 damaged links none is shown as if it were right", () => {
+  const first = firstState(description);
+  const state = { ...first, values: { ...first.values, "model.damping": 0.25 }, start: { ...first.start, x: 0.5 }, windows: { phase: [-1, 1, -1, 1] } };
+  const link = linkOf(state, first, description);
+  const next = random(3);
+  const letters = "0123456789abcdef.&=_-%é#< eNaN";
+  for (let i = 0; i < 10000; i++) {
+    const at = Math.floor(next() * link.length);
+    const letter = letters[Math.floor(next() * letters.length)];
+    const kind = i % 4;
+    let damaged = link.slice(0, at) + letter + link.slice(at + 1);
+    if (kind === 1) damaged = link.slice(0, at);
+    if (kind === 2) damaged = link.slice(0, at) + letter + link.slice(at);
+    if (kind === 3) damaged = link.slice(0, at) + link.slice(at + 1 + Math.floor(next() * 5));
+    const found = stateOf(damaged, first, description);
+    if (damaged === link) assert.deepEqual(found, { state });
+    else if (damaged === "") assert.deepEqual(found, { state: first });
+    else assert.ok("refusal" in found, damaged);
+  }
+});
+
+test("a link with a right check sum and senseless contents is refused", async () => {
+  const { checkSum } = await import("../../src/saltus/web/page/link.js");
+  const first = firstState(description);
+  const senseless = ["model.damping=NaN", "model.damping=Infinity", "model.damping=1e999", "model.nothing=1", "__proto__=1", "window.phase=1_0_0_1",
+    "window.phase=0_1", "show.coordinate=-1", "show.theme=red", "show.selected=1_2_x", "sweep.path=model.nothing", "start.y=1", "range.model.damping=2_1", "="];
+  for (const text of senseless) {
+    assert.ok("refusal" in stateOf(`${text}&check=${checkSum(text, "abc")}`, first, description), text);
+  }
+});
+
+test("bars of a cell keep their length, and the halves of a diagonal theirs", () => {
+  const distance = ([a, b], [c, d]) => Math.hypot(a - c, b - d);
+  for (const [beta0, theta1, theta2] of [[1.4, 0, 0], [1.4, 0.7, 0], [1.2, 0, -1.1], [1.0, 2.0, -0.4]]) {
+    const p = cellPoints(beta0, theta1, theta2);
+    const half = distance(p.lowerLeft, cellPoints(beta0, 0, 0).slider1[0]);
+    for (const [a, b] of [[p.lowerLeft, p.middleLeft], [p.lowerRight, p.middleRight], [p.middleLeft, p.upperLeft], [p.middleRight, p.upperRight]]) {
+      assert.ok(Math.abs(distance(a, b) - 1) < 1e-12);
+    }
+    for (const [a, b] of [[p.lowerLeft, p.slider1[0]], [p.slider1[1], p.middleRight], [p.middleRight, p.slider2[0]], [p.slider2[1], p.upperLeft]]) {
+      assert.ok(Math.abs(distance(a, b) - half) < 1e-12);
+    }
+  }
+});
+
+test("jumps are where the amplitude leaps", () => {
+  const points = Array.from({ length: 41 }, (_, i) => ({ value: i / 40, amplitude: i < 25 ? 0.1 + i * 0.002 : 0.9 - i * 0.002, state: [], stop: "horizon" }));
+  const jumps = jumpsOf(points);
+  assert.equal(jumps.length, 1);
+  assert.deepEqual([jumps[0].from.value, jumps[0].to.value], [24 / 40, 25 / 40]);
+});
+
+test("a branch is drawn in stretches of one stability, which meet", () => {
+  assert.deepEqual(runs([1, 1, 0, 0, 1]), [[0, 2], [2, 4], [4, 4]]);
+  assert.deepEqual(runs([1]), [[0, 0]]);
+});
+
+test("the chart's colours fall in lightness all the way, so that they survive greyscale", () => {
+  const grey = (share) => {
+    const [r, g, b] = shade(share).match(/\d+/g).map(Number);
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  };
+  for (let i = 0; i < 50; i++) assert.ok(grey(i / 50) > grey((i + 1) / 50));
+});
+
+test("a window is never narrower than its numbers can tell", () => {
+  assert.ok(wideEnough([0, 1e-9, -1, 1]));
+  assert.ok(!wideEnough([1, 1 + 1e-15, -1, 1]));
+  assert.ok(!wideEnough([0, NaN, 0, 1]));
+  assert.ok(!wideEnough([0, 1, 0, 1e200]));
+});
