@@ -5,8 +5,6 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import importlib.util
-import math
-import stat
 import sys
 import traceback
 from collections.abc import Mapping
@@ -14,10 +12,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import numpy as np
-
-from saltus.checks import LIMITS, free_memory
-from saltus.config.readers import Keys, Source, read, read_number, read_table, read_text, readers_of, show
+from saltus.config.readers import READERS, Keys, Source, read, read_number, read_table, read_text, readers_of, show
 from saltus.errors import ParameterError, near
 from saltus.systems import IMPACTS, MODELS, ImpactLaw, Model, Record, register, signal_class
 
@@ -108,8 +103,7 @@ def _where(error: BaseException, path: str) -> str:
     return f" (its line {lines[-1]})" if lines else ""
 
 
-COLUMNS = "a record has two columns, time and value, and other formats must be written so"
-RECORD_MEMORY = 20  # bytes that a character of a record takes, about, while it is read: as text, in lines, in pairs of numbers
+RECORD_KEYS = {"units": str, "baseline": int, "component": int, "time_scale": float}  # of a file, besides the fields of a Record
 
 
 def read_load(source: Source, data: Any) -> dict[str, Any]:
@@ -142,68 +136,13 @@ def _record(source: Source, keys: Keys, data: Mapping[str, Any]) -> dict[str, An
     for name in ("time", "value", "source"):
         if name in data:
             source.refuse((*keys, name), f"{'.'.join(keys)} has both file and {name}; keep one of them")
-    values = read_table(source, keys, data, {**readers_of(Record), "file": read_text})
-    name = values.pop("file")
-    time, value = read_samples(source, (*keys, "file"), name)
-    return {**values, "time": time, "value": value, "source": name}
-
-
-def read_samples(source: Source, keys: Keys, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Times and values from the first two columns of the text file `name`, relative to the study.
-
-    Columns are parted by commas, semicolons, tabs or spaces; one line of headings, blank lines and lines that begin with # are
-    skipped. Returns two arrays of shape (samples,).
-
-    Raises
-    ------
-    ParameterError
-        No such file, a line that is not two finite numbers, times that do not increase (with the line).
-    """
-    where = f"{'.'.join(keys)} {name!r}"
-    path = source.path.parent / Path(name)
+    readers = {name: READERS[kind] for name, kind in RECORD_KEYS.items()}
+    values = read_table(source, keys, data, {**readers_of(Record), **readers, "file": read_text})
+    name, scale = values.pop("file"), values.pop("scale", 1.0)
     try:
-        found, problem = path.stat(), ""
-        if not stat.S_ISREG(found.st_mode):  # reading a device or a pipe may never end
-            problem = "is no file"
-        elif RECORD_MEMORY * found.st_size > LIMITS.memory * free_memory():
-            problem = f"has {found.st_size} bytes, more than fits into the free memory"
-        text = "" if problem else path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        problem = "does not exist; paths are relative to the study file"
-    except UnicodeDecodeError:
-        problem = "is not a text file; a record has two columns, time and value"
-    except (OSError, ValueError) as error:
-        problem = f"cannot be read ({getattr(error, 'strerror', None) or error!s:.120})"
-    if problem:
-        source.refuse(keys, f"{where} {problem}")
-    rows: list[tuple[float, float]] = []
-    headed = False
-    for number, line in enumerate(text.splitlines(), start=1):
-        if not line.strip() or line.lstrip().startswith("#"):
-            continue
-        row = _row(line)
-        if row is None:
-            if rows or headed:
-                source.refuse(keys, f"{where}: line {number} must be two finite numbers, got {show(line.strip())}; {COLUMNS}")
-            headed = True
-            continue
-        if rows and row[0] <= rows[-1][0]:
-            source.refuse(
-                keys, f"{where}: times must increase, but line {number} has {row[0]:g} after {rows[-1][0]:g}; sort the file"
-            )
-        rows.append(row)
-    time, value = np.array(rows, dtype=float).reshape(-1, 2).T
-    return time, value
-
-
-def _row(line: str) -> tuple[float, float] | None:
-    """The first two numbers of a line, or None. With commas there must be exactly two cells, as commas may be decimal ones."""
-    separator = next((s for s in ";,\t" if s in line), None)
-    cells = [cell.strip().strip('"') for cell in line.split(separator)]
-    try:
-        time, value = (float(cell) for cell in (cells if separator == "," else cells[:2]))
-    except ValueError:
-        return None
-    written = "".join(cells[:2])
-    plain = written.isascii() and "_" not in written  # Python would read 1_0 as ten, and digits of other scripts
-    return (time, value) if plain and math.isfinite(time) and math.isfinite(value) else None
+        record = Record.read(source.path.parent / name, source=name, **values)
+    except ParameterError as error:
+        beside = "; paths are relative to the study file" if str(error).endswith("does not exist") else ""
+        joined = "." if error.parameter and str(error).startswith(error.parameter) else ": "
+        source.refuse((*keys, error.parameter or "file"), f"{'.'.join(keys)}{joined}{error}{beside}")
+    return {"time": record.time, "value": record.value, "quantity": record.quantity, "scale": scale, "source": name}

@@ -14,6 +14,7 @@ from saltus.systems.impact_laws import ImpactLaw
 from saltus.systems.load import Load
 from saltus.systems.metainterface import Metainterface
 from saltus.systems.pulses import Pulse, in_other_units
+from saltus.systems.record_files import GRAVITY
 from saltus.systems.rocking_block import RockingBlock
 from saltus.systems.signals import Record, Signal, Sum, scaled
 from saltus.systems.system import System
@@ -208,9 +209,6 @@ class PhysicalCell(Physical):
             The angle of the undeformed cell, rad, in (0, pi).
         """
         return TwoLayer(beta0=beta0, **self.ratios)
-
-
-GRAVITY = 9.80665  # m/s^2, the standard value, which also makes the g of a record
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -240,6 +240,64 @@ class Record(Signal):
         span = f"{self.time.size} samples in [{self.time[0]:g}, {self.time[-1]:g}]"
         return f"Record({span}, quantity={self.quantity!r}, scale={self.scale!r})"
 
+    @classmethod
+    def read(
+        cls,
+        path: Any,
+        *,
+        quantity: str | None = None,
+        units: str | None = None,
+        scale: float = 1.0,
+        baseline: int | None = None,
+        component: int = 1,
+        time_scale: float = 1.0,
+        source: str | None = None,
+    ) -> Record:
+        """The record in a file: AT2, VT2 or DT2 of PEER, V2 of CSMIP or COSMOS, or text with two columns, time and value.
+
+        Where the unit is known, times are s and values m/s^2, m/s, m or N; `PhysicalBlock.load` and `PhysicalCell.load` make a
+        load of such records dimensionless. The numbers in a text whose `units` are not given are taken as they are.
+
+        Parameters
+        ----------
+        path
+            The path of the file.
+        quantity
+            The quantity of the samples. A V2 file has several, of which the acceleration is read unless another one is asked for;
+            of a text without `units` it is a force by default.
+        units
+            The unit of the samples in the file: g, m/s2, cm/s2 (gal), mm/s2, m/s, cm/s, mm/s, m, cm, mm, N or kN; by default the
+            one that the file names.
+        scale
+            The factor by which every sample is multiplied.
+        baseline
+            The degree of a polynomial in time that is fitted to the samples by least squares and subtracted: 0 subtracts their
+            mean, 1 a straight line. By default nothing is subtracted.
+        component
+            Which of the components in a V2 file, from 1 on.
+        time_scale
+            The factor by which the times are multiplied.
+        source
+            The name of the record; by default its path.
+
+        Raises
+        ------
+        ParameterError
+            No such file, a file of another format, a line that cannot be read, units that are not known or contradict the file.
+
+        Examples
+        --------
+        >>> with open("HILL.AT2", "w") as file:
+        ...     lines = ["PEER", "Hill, 1/1/2000, Foot, 90", "ACCELERATION TIME SERIES IN UNITS OF G", "NPTS= 3, DT= .01 SEC"]
+        ...     print(*lines, " 0.0 .2E+00 -.1E+00", sep=chr(10), file=file)
+        78
+        >>> saltus.Record.read("HILL.AT2").value
+        array([ 0.     ,  1.96133 , -0.980665])
+        """
+        from saltus.systems.record_files import read_record
+
+        return cls(**read_record(path, quantity, units, baseline, component, time_scale, source), scale=scale)
+
     @cached_property
     def polynomials(self) -> tuple[Any, Any, Any]:
         """The value and its first two derivatives as SciPy piecewise polynomials, `scale` left out."""
