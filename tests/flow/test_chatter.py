@@ -15,11 +15,11 @@ from scipy.integrate import quad
 from shared_systems import BETA80, forced
 
 from saltus.flow import EventKind, simulate
+from saltus.flow.kernel.compiled import program
 from saltus.flow.kernel.layout import Mode, Status
 from saltus.flow.kernel.memory import EventBuffers, StepBuffers
-from saltus.flow.kernel.structures import program
-from saltus.flow.motion.request import MotionRequest
-from saltus.flow.one_contact.state import KernelState
+from saltus.flow.motion.kernel_state import KernelState
+from saltus.flow.motion.simulate import MotionRequest
 from saltus.systems import EnergyRestitution, Harmonic, Load, System, WallOscillator
 
 

@@ -8,8 +8,8 @@ import pytest
 from numba import from_dtype, njit, types
 
 from saltus.flow.kernel import layout as kernel_layout
-from saltus.flow.kernel.memory_layout import HIGHEST_ORDER, LOWEST_ORDER, SERIES_LENGTH
-from saltus.flow.lanes import gap_roots, lane_steps, memory
+from saltus.flow.kernel.layout import HIGHEST_ORDER, LOWEST_ORDER, SERIES_LENGTH
+from saltus.flow.lanes import lane_steps, memory
 from saltus.flow.lanes.memory import FLAGS, ROW, SERIES, Gap
 from saltus.taylor import LanesType, compiled_part, lane_memory, lane_vectors, named_tuple, private_numba, shared_as
 from saltus.taylor.lane_vectors import (
@@ -31,7 +31,7 @@ EPS = 2.0**-52
 H = 0.7  # the step
 COMPILED = {"np": np, "math": math, "SERIES_LENGTH": SERIES_LENGTH}
 COMPILED |= vars(lane_vectors) | vars(private_numba) | vars(lane_memory) | {"Gap": Gap}
-for part in (kernel_layout, memory, lane_steps, gap_roots):
+for part in (kernel_layout, memory, lane_steps):
     exec(compiled_part(part), COMPILED)
 motion_at, only_root, guess_from_end = COMPILED["motion_at"], COMPILED["only_root"], COMPILED["guess_from_end"]
 sweep, short_flight, guess_from_start = COMPILED["sweep"], COMPILED["short_flight"], COMPILED["guess_from_start"]

@@ -13,7 +13,7 @@ from shared_systems import Pair
 import saltus
 from saltus.flow import stop_names
 from saltus.systems import Harmonic, Load, Model, System
-from saltus.systems.registry import IMPACTS, MODELS
+from saltus.systems.serial import IMPACTS, MODELS
 
 GUESSES = (0.4, 0.3, 0.9, 1.1)  # for a number without a default that a model may want
 

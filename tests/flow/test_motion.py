@@ -419,8 +419,8 @@ def test_a_stiff_motion_that_does_not_fit_into_memory_is_refused_with_what_helps
     from saltus.checks import Limits
     from saltus.errors import MotionError
 
-    monkeypatch.setattr("saltus.flow.motion.recorder.LIMITS", Limits(any_machine=1e5))
-    monkeypatch.setattr("saltus.flow.motion.recorder.free_memory", lambda: 2e6)
+    monkeypatch.setattr("saltus.flow.motion.kernel_state.LIMITS", Limits(any_machine=1e5))
+    monkeypatch.setattr("saltus.flow.motion.kernel_state.free_memory", lambda: 2e6)
     stiff = WALL.with_({"model.damping": 1e5})
     with pytest.raises(MotionError, match=r"GB of memory, and 0\.002 GB are left; give times=\.\.\."):
         simulate(stiff, x=0.1, duration=1.0)

@@ -9,9 +9,9 @@ import pytest
 
 from saltus.errors import ParameterError, SaltusError
 from saltus.flow import simulate
-from saltus.flow.kernel.structures import _structures
+from saltus.flow.kernel.compiled import _structures
 from saltus.systems import Harmonic, Load, Model, OneContactModel, System, VelocityReduction, WallOscillator
-from saltus.systems.registry import MODELS, register
+from saltus.systems.serial import MODELS, register
 from saltus.taylor.cache import cache_directory
 
 

@@ -19,9 +19,8 @@ from saltus.systems import (
     VelocityReduction,
     WallOscillator,
 )
-from saltus.systems.parameters import numbers
+from saltus.systems.serial import numbers
 from saltus.taylor import record_table, trace
-from saltus.taylor.derivatives import tangent_leaves
 from saltus.taylor.graph import Expr, differentiate, ordered
 
 WEIGHTS = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}  # central differences of order 8
@@ -115,7 +114,7 @@ def test_the_saltation_is_the_derivative_of_the_jump(name):
     leaves = {("parameter", i): x for i, (_, x) in enumerate(numbers(system))}
     leaves |= {"time": t - origin, "origin": origin, "side": float(side), ("velocity", 0): before}
     for j, expected in enumerate(columns(system, side, t, before, paths)):
-        (u,), (z,) = tangent_leaves(traced, j)
+        (u,), (z,) = traced.tangent_leaves(j)
         start = {("coordinate", u.value): float(j == 0), ("velocity", z.value): float(j == 1)}
         computed = [value(part[j], leaves | start) for part in (jumps.coordinate, jumps.velocity, jumps.shift)]
         np.testing.assert_allclose(computed, expected, rtol=1e-9, atol=1e-9, err_msg=f"column {j}")
@@ -132,7 +131,7 @@ def test_the_determinant_of_the_saltation_is_that_of_the_law(name):
     leaves |= {"time": 0.4, "origin": 0.0, "side": float(side), ("velocity", 0): before}
     matrix = np.zeros((2, 2))
     for j in (0, 1):
-        (u,), (z,) = tangent_leaves(traced, j)
+        (u,), (z,) = traced.tangent_leaves(j)
         start = leaves | {("coordinate", u.value): float(j == 0), ("velocity", z.value): float(j == 1)}
         matrix[:, j] = value(jumps.coordinate[j], start), value(jumps.velocity[j], start)
     after = system.model.reset(0.4, before, side, system.load, system.impact)[1]

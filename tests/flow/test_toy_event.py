@@ -11,7 +11,7 @@ import saltus
 MOST_FILES = 10
 # A peak: the first coordinate has a maximum on a smooth arc. In each file, what is put behind which of its lines.
 PEAK = {
-    "flow/kernel/memory_layout.py": {
+    "flow/kernel/layout.py": {
         "    REVERSAL = 9\n    RESET_SLOPES = 10": "    REVERSAL = 9\n    PEAK = 10\n    RESET_SLOPES = 11"
     },
     "flow/motion/events.py": {'    REVERSAL = "reversal"': '    REVERSAL = "reversal"\n    PEAK = "peak"\n    # once'},

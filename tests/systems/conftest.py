@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 import sympy as sp
 
-from saltus.systems.parameters import substitute
+from saltus.systems.serial import substitute
 
 
 class _Channel:

@@ -5,16 +5,16 @@ from functools import cache
 import numpy as np
 from numba import njit
 
-from saltus.flow.kernel import function_types
+from saltus.flow.kernel import memory
 from saltus.flow.kernel.compiled import load_structure
-from saltus.systems.parameters import numbers
+from saltus.systems.serial import numbers
 from saltus.taylor import record_table, trace, written_type
 
 
 @cache
 def caller(name):
     """A function that calls a generated one, which has no wrapper for Python, through its pointer."""
-    signature = getattr(function_types, name.upper())
+    signature = getattr(memory, name.upper())
     arguments = ", ".join(f"x{i}" for i in range(len(signature.args)))
     scope = {}
     exec(f"def call(f, {arguments}):\n    return f({arguments})", scope)

@@ -14,7 +14,7 @@ import pytest
 from generated_functions import Generated
 
 from saltus.systems import Load, System, VelocityReduction, WallOscillator
-from saltus.taylor import cache, generated, load_module, machine_code, module_name
+from saltus.taylor import cache, generated, load_module, module_name
 from saltus.taylor.cache import cache_directory, undamaged
 
 SOURCE = """
@@ -297,7 +297,7 @@ def test_an_object_file_is_named_by_the_processor_and_by_llvm_s_version(home, mo
     system = System(model=WallOscillator(damping=0.1), load=Load(frequency=1.0), impact=VelocityReduction(0.8))
     (first,), value = objects(home, system)
     generated.written_by.cache_clear()
-    monkeypatch.setattr(machine_code, "made_for", lambda: "another machine")
+    monkeypatch.setattr(generated, "made_for", lambda: "another machine")
     both, again = objects(home, system)
     assert len(both) == 2
     assert first in both

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from saltus.taylor.common_form import CommonForm
+from saltus.flow.contacts.one_free import CommonForm
 from saltus.taylor.graph import Expr, differentiate, ordered, substitute
 
 q, v, t = Expr("coordinate", (), 0), Expr("velocity", (), 0), Expr("time")

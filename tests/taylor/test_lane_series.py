@@ -9,9 +9,9 @@ from numba import njit, types
 from power_series import solution
 from test_series import OPERATIONS, agrees, force
 
-from saltus.flow.kernel.memory_layout import HIGHEST_ORDER, LOWEST_ORDER
-from saltus.flow.kernel.memory_layout import SERIES_LENGTH as STRIDE
-from saltus.flow.kernel.structures import program
+from saltus.flow.kernel.compiled import program
+from saltus.flow.kernel.layout import HIGHEST_ORDER, LOWEST_ORDER
+from saltus.flow.kernel.layout import SERIES_LENGTH as STRIDE
 from saltus.flow.lanes.compiled_lanes import load_lane_functions
 from saltus.flow.lanes.function_types import LANE_SERIES
 from saltus.flow.lanes.memory import SLOTS

@@ -11,8 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from saltus.checks import settle_numbers
-from saltus.systems.contact import Contact
-from saltus.systems.contact_model import ContactModel
+from saltus.systems.contact_model import Contact, ContactModel
 from saltus.systems.load import Load
 from saltus.systems.metainterface import LayeredCell
 from saltus.systems.model import MarginKind

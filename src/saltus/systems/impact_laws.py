@@ -10,8 +10,7 @@ import numpy as np
 from saltus.checks import check_number, settle_numbers
 from saltus.errors import ParameterError
 from saltus.public_functions import answered
-from saltus.systems.contact import Contact
-from saltus.systems.contact_model import ContactModel
+from saltus.systems.contact_model import Contact, ContactModel
 from saltus.systems.load import Load
 from saltus.systems.model import Model, OneContactModel
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import StrEnum
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from saltus.errors import ParameterError, near, shown
-from saltus.systems.contact import Contact, Friction
+
+if TYPE_CHECKING:
+    from saltus.systems.contact_model import Contact, Friction
 
 
 class MarginKind(StrEnum):

@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.checks import LIMITS, check_memory
 from saltus.errors import ParameterError, near, shown
-from saltus.systems.parameters import numbers
+from saltus.systems.serial import numbers
 from saltus.systems.system import System
 
 # Up to this number of rows of parameters, a system is made of each; of more, those with a least or largest value are checked, and

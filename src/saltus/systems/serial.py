@@ -1,15 +1,176 @@
-"""Systems as plain dictionaries, and back: the form in which they are written to files."""
+"""Systems as plain dictionaries, and back: the form in which they are written to files; and the types that a file may name.
+
+A new model, impact law or pulse is one new file, one line in the door of this room and one name here.
+"""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
-from typing import Any
+from collections import UserDict, defaultdict
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
+from importlib import import_module
+from typing import Any, TypeVar
 
 from saltus.errors import ParameterError, near, shown
+from saltus.systems.impact_laws import Factors, ImpactLaw
 from saltus.systems.load import Load
-from saltus.systems.pulses import Pulse
-from saltus.systems.signals import Constant, Harmonic, Record, Signal, Sum, as_signal
+from saltus.systems.model import Model, OneContactModel, check_one_contact
+from saltus.systems.signals import Constant, Harmonic, Pulse, Record, Signal, Sum, as_signal
+
+
+def children(node: Any) -> dict[str, Any]:
+    """The named parts of a part of a system: fields of a dataclass, channels of a load, terms of a sum, factors of a law."""
+    if isinstance(node, Load):
+        return {"frequency": node.frequency, **node.channels}
+    if isinstance(node, (Sum, Factors)):
+        return {str(i): term for i, term in enumerate(node.terms if isinstance(node, Sum) else node)}
+    kind: Any = type(node)
+    return {name: getattr(node, name) for name in _fields_of(kind)}
+
+
+@cache
+def _fields_of(kind: type) -> tuple[str, ...]:
+    """The names of the fields of a dataclass; none of any other class."""
+    return tuple(f.name for f in dataclasses.fields(kind)) if dataclasses.is_dataclass(kind) else ()
+
+
+def is_number(value: Any) -> bool:
+    """Whether a leaf is a number of the system; switches and names belong to its structure."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def numbers(node: Any, prefix: str = "") -> Iterator[tuple[str, float]]:
+    """Every number below `node` with its dotted path; a `Constant` is the path of its channel."""
+    if isinstance(node, Constant):
+        yield prefix, node.value
+        return
+    for name, child in children(node).items():
+        path = f"{prefix}.{name}" if prefix else name
+        if is_number(child):
+            yield path, float(child)
+        else:
+            yield from numbers(child, path)
+
+
+def replace(node: Any, changes: Mapping[str, Any], where: str = "") -> Any:
+    """A copy of `node` with the parts at the given dotted paths replaced, all at once, so that their order does not matter.
+
+    Where a part and something below it are both given, the part is replaced first. Numbers become constant signals where
+    signals stand.
+
+    Raises
+    ------
+    ParameterError
+        A path that leads nowhere; the error names similar ones. A value that the new system refuses.
+    """
+    parts, below = children(node), defaultdict[str, dict[str, Any]](dict)
+    for path, value in changes.items():
+        head, _, rest = str(path).partition(".")
+        if head not in parts and not (isinstance(node, Load) and head.isidentifier() and not rest):
+            hint = f"{type(node).__name__} has no {shown(head)}; {near(head, children(node))}"
+            raise ParameterError(f"no parameter {shown(where + str(path))}: {hint}", where + str(path))
+        if rest:
+            below[head][rest] = value
+        else:
+            parts[head] = value
+    for head, deeper in below.items():
+        parts[head] = replace(parts[head], deeper, f"{where}{head}.")
+    if isinstance(node, Load):
+        return Load(**parts)
+    if isinstance(node, Sum):
+        return Sum(tuple(as_signal(part, f"{where}{name}") for name, part in parts.items()))
+    if isinstance(node, Factors):
+        return Factors(parts.values())
+    try:
+        return dataclasses.replace(node, **parts)
+    except ParameterError as error:
+        raise (error.inside(where[:-1]) if where else error) from None
+
+
+def substitute(node: Any, leaf: Callable[[str, float], Any], prefix: str = "") -> Any:
+    """A copy of `node` with every number replaced by `leaf(path, number)`, made without checks: for tracing."""
+    twin: Any
+    if isinstance(node, Constant):
+        twin = object.__new__(Constant)
+        object.__setattr__(twin, "value", leaf(prefix, node.value))
+        return twin
+    parts = {}
+    for name, child in children(node).items():
+        path = f"{prefix}.{name}" if prefix else name
+        parts[name] = leaf(path, float(child)) if is_number(child) else substitute(child, leaf, path)
+    if isinstance(node, Load):
+        twin = object.__new__(Load)
+        object.__setattr__(twin, "frequency", parts.pop("frequency"))
+        object.__setattr__(twin, "channels", parts)
+        return twin
+    if isinstance(node, Sum):
+        twin = object.__new__(Sum)
+        object.__setattr__(twin, "terms", tuple(parts.values()))
+        return twin
+    if isinstance(node, Factors):
+        return Factors(parts.values())
+    if not dataclasses.is_dataclass(node):
+        return node
+    twin = object.__new__(type(node))
+    for name, part in parts.items():
+        object.__setattr__(twin, name, part)
+    return twin
+
+
+class Classes(UserDict[str, Any]):
+    """Classes by their names. One of saltus is imported when it is first asked for: a motion needs one model, not all."""
+
+    def __getitem__(self, name: str) -> Any:
+        if self.data[name] is None:
+            self.data[name] = getattr(import_module("saltus.systems"), name)
+        return self.data[name]
+
+
+MODELS = Classes(
+    dict.fromkeys(("Metainterface", "RockingBlock", "TwoLayer", "WallOscillator", "TwoStops", "ImpactPair", "BeltOscillator"))
+    | dict.fromkeys(("TwoCells", "ThreeCells", "FourCells"))
+)
+IMPACTS = Classes(dict.fromkeys(("VelocityReduction", "EnergyRestitution", "InelasticImpact", "NewtonImpact")))
+PULSES = Classes(dict.fromkeys(("HalfSine", "OneSine", "OneCosine", "MavroeidisPapageorgiou", "Ricker", "Ramp", "Chirp")))
+
+T = TypeVar("T", type[Model], type[ImpactLaw])
+
+
+def register(cls: T) -> T:
+    """Make a model or an impact law of your own known by its class name, so that files can name it; use as a decorator.
+
+    Raises
+    ------
+    ParameterError
+        A class that is neither; a model whose sides and reset do not go together.
+
+    Examples
+    --------
+    >>> saltus.register(saltus.WallOscillator) is saltus.WallOscillator
+    True
+    """
+    if not isinstance(cls, type):
+        raise ParameterError(f"register takes a Model or an ImpactLaw, got {shown(cls)}", "cls")
+    if issubclass(cls, Model):
+        if issubclass(cls, OneContactModel):
+            check_one_contact(cls)
+        MODELS[cls.__name__] = cls
+    elif issubclass(cls, ImpactLaw):
+        IMPACTS[cls.__name__] = cls
+    else:
+        raise ParameterError(f"register takes a Model or an ImpactLaw, got {shown(cls)}", "cls")
+    return cls
+
+
+def find(kind: str, name: str) -> type[Model] | type[ImpactLaw]:
+    """The class called `name`, of the `kind` "model" or "impact"."""
+    known = MODELS if kind == "model" else IMPACTS
+    if name not in known:
+        hint = f"{near(name, known)} (one of your own is made known by saltus.register)"
+        raise ParameterError(f"{kind}.type {shown(name)} is not known; {hint}", f"{kind}.type")
+    found: type[Model] | type[ImpactLaw] = known[name]
+    return found
 
 
 def to_dict(part: Any) -> Any:
@@ -45,8 +206,6 @@ def from_dict(kind: str, data: Any) -> Any:
     name = fields.pop("type")
     if not isinstance(name, str):
         raise ParameterError(f"{kind}.type must be a name in quotes, got {shown(name)}", f"{kind}.type")
-    from saltus.systems.registry import find  # it imports all models, impact laws and pulses, which writing does not need
-
     return build(find(kind, name), fields, kind)
 
 
@@ -69,13 +228,12 @@ def signal_class(data: Mapping[str, Any], where: str) -> type[Signal]:
     """
     if "type" not in data:
         return Record if "time" in data or "value" in data else Harmonic
-    from saltus.systems.registry import PULSES
-
     name = data["type"]
     if not isinstance(name, str) or name not in PULSES:
         hint = f"{near(str(name), PULSES)} (a harmonic and a record have no type)"
         raise ParameterError(f"{where}.type {shown(name)} is no pulse; {hint}", f"{where}.type")
-    return PULSES[name]
+    found: type[Signal] = PULSES[name]
+    return found
 
 
 def build(cls: type, fields: dict[str, Any], where: str) -> Any:

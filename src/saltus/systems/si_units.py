@@ -13,10 +13,10 @@ from saltus.errors import ParameterError
 from saltus.systems.impact_laws import ImpactLaw
 from saltus.systems.load import Load
 from saltus.systems.metainterface import Metainterface
-from saltus.systems.pulses import Pulse, in_other_units
+from saltus.systems.oscillators import RockingBlock
+from saltus.systems.pulses import in_other_units
 from saltus.systems.record_files import GRAVITY
-from saltus.systems.rocking_block import RockingBlock
-from saltus.systems.signals import Record, Signal, Sum, scaled
+from saltus.systems.signals import Pulse, Record, Signal, Sum, scaled
 from saltus.systems.system import System
 from saltus.systems.two_layer import TwoLayer
 

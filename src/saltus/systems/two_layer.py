@@ -8,8 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.systems.contact import Contact
-from saltus.systems.contact_model import ContactModel, reactions
+from saltus.systems.contact_model import Contact, ContactModel, reactions
 from saltus.systems.load import Load, reversed_load
 from saltus.systems.metainterface import LayeredCell
 from saltus.systems.model import MarginKind

@@ -1,11 +1,11 @@
 """From a model's Python to its Taylor series in machine code: traced, differentiated, written, compiled and cached.
 
-The path of an equation. `tracing.py` runs a model once on symbols, which gives a graph of shared nodes (`graph.py`).
-`derivatives.py` differentiates it. `tapes.py` lists the nodes, operands first. Of a structure's functions, each with its tapes
-and the places of its numbers, `generated.py` makes LLVM's text: `series.py` (Taylor coefficients) and `instant` (values at one
-instant) write the instructions by the rules of `rules.py`, for one motion on plain doubles, for an ensemble on vectors with one
-double for each lane. `machine_code.py` compiles it by llvmlite, without numba. `memory.py` has the places of the code's
-arguments, `vectors.py` the arithmetic on which it is written; `lane_vectors.py` gives numba the same vectors for the ensemble's
+The path of an equation. `tracing.py` runs a model once on symbols, which gives a graph of shared nodes (`graph.py`), and
+differentiates it where a tangent is asked for. `memory.py` lists the nodes on tapes, operands first, and has the places of the
+code's arguments. Of a structure's functions, each with its tapes, `generated.py` makes LLVM's text: `series.py` (Taylor
+coefficients) and `instant` (values at one instant) write the instructions by the rules of `rules.py`, for one motion on plain
+doubles, for an ensemble on vectors with one double for each lane. `generated.py` also compiles it by llvmlite, without numba.
+`vectors.py` has the arithmetic on which it is written; `lane_vectors.py` gives numba the same vectors for the ensemble's
 own loops. There is no second generator, and each function has one rule.
 
 Kernels, which no model changes, are compiled by numba (`kernels.py`, `private_numba.py`) and call a structure's functions by
@@ -28,8 +28,26 @@ of the sources that compile it, and numba keeps the machine code beside it. Numb
 compile anything. Interfaces of numba that are not public are used in `private_numba.py` alone.
 """
 
+import os
+
 from saltus._front_door import front_door
-from saltus.taylor.machine_code import check_environment
+from saltus.errors import SaltusError
+
+
+def check_environment() -> None:
+    """Refuse settings that would make numba fail with its own message when it is imported, or, without its compiler, much later.
+
+    Raises
+    ------
+    SaltusError
+        NUMBA_DISABLE_JIT is set, or NUMBA_NUM_THREADS is no count.
+    """
+    disabled, threads = os.environ.get("NUMBA_DISABLE_JIT", "0"), os.environ.get("NUMBA_NUM_THREADS", "1")
+    if disabled not in ("", "0"):
+        raise SaltusError("the environment has NUMBA_DISABLE_JIT set, but saltus is nothing without its compiler; unset it")
+    if not (threads.isdecimal() and int(threads) > 0):
+        raise SaltusError(f"the environment has NUMBA_NUM_THREADS={threads[:20]!r}, which is no number of threads; unset it")
+
 
 check_environment()
 __getattr__, __dir__, __all__ = front_door(__name__, __file__)

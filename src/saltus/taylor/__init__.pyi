@@ -1,12 +1,6 @@
 from .cache import cache_directory as cache_directory
 from .cache import digest as digest
 from .cache import source_of as source_of
-from .common_form import CommonForm as CommonForm
-from .derivatives import FREQUENCY as FREQUENCY
-from .derivatives import derivative_along as derivative_along
-from .derivatives import partial_derivative as partial_derivative
-from .derivatives import tangent_leaves as tangent_leaves
-from .derivatives import time_derivative as time_derivative
 from .equations import equations_of as equations_of
 from .equations import structure_key as structure_key
 from .exact_algebra import Form as Form
@@ -21,6 +15,7 @@ from .generated import functions_text as functions_text
 from .generated import load_functions as load_functions
 from .graph import RECORD_WIDTH as RECORD_WIDTH
 from .graph import Expr as Expr
+from .graph import combine as combine
 from .graph import differentiate as differentiate
 from .graph import is_steep as is_steep
 from .graph import number as number
@@ -63,6 +58,8 @@ from .load_tables import own_records as own_records
 from .load_tables import record_table as record_table
 from .load_tables import record_tables as record_tables
 from .memory import Places as Places
+from .memory import shared_constants as shared_constants
+from .memory import tape as tape
 from .numba_types import Pointer as Pointer
 from .numba_types import function_type as function_type
 from .numba_types import written_type as written_type
@@ -70,8 +67,7 @@ from .private_numba import entry_point as entry_point
 from .private_numba import pointer as pointer
 from .rules import FUNCTIONS as FUNCTIONS
 from .series import Rows as Rows
-from .tapes import shared_constants as shared_constants
-from .tapes import tape as tape
+from .tracing import FREQUENCY as FREQUENCY
 from .tracing import Trace as Trace
 from .tracing import check_size as check_size
 from .tracing import trace as trace

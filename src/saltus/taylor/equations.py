@@ -17,7 +17,7 @@ from saltus.errors import ParameterError, SaltusError
 from saltus.systems import Record, System, children, is_number
 from saltus.taylor.cache import digest
 from saltus.taylor.graph import Expr
-from saltus.taylor.tapes import tape
+from saltus.taylor.memory import tape
 from saltus.taylor.tracing import Trace, trace
 
 MOST_KNOWN = 64  # the most systems whose digests are kept, as a study asks for the same ones many times

@@ -7,22 +7,22 @@ structure's recurrences, and its cache is slower to read than an object file.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+import threading
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, NamedTuple
 
+import llvmlite
 from llvmlite import binding, ir
 
-from saltus.taylor import graph, load_tables, machine_code, memory, numba_types, rules, series, sums, tapes, vectors
+from saltus.taylor import graph, load_tables, memory, numba_types, rules, series, vectors
 from saltus.taylor.cache import digest, kept_bytes, loading, source_of
 from saltus.taylor.graph import LEAVES
-from saltus.taylor.machine_code import Loaded
-from saltus.taylor.memory import Memory, Place, Places
+from saltus.taylor.memory import Memory, Place, Places, Tape
 from saltus.taylor.numba_types import Pointer, given_arguments, result_count, written_function, written_type
 from saltus.taylor.rules import FUNCTIONS
 from saltus.taylor.series import Rows, Series
-from saltus.taylor.tapes import Tape
 from saltus.taylor.vectors import CACHE_LINE, LONG, Arithmetic, Vec, add, multiply, subtract
 
 ARITHMETIC: dict[str, Callable[[Any, Any], Any]] = {"add": add, "sub": subtract, "mul": multiply, "div": lambda a, b: a / b}
@@ -157,8 +157,8 @@ def functions_text(functions: Sequence[WrittenFunction]) -> str:
 @cache
 def written_by() -> str:
     """A digest of the sources that write code, and of what LLVM makes of it on this machine."""
-    writers = (graph, load_tables, machine_code, memory, numba_types, rules, series, sums, tapes, vectors, sys.modules[__name__])
-    return digest(*(source_of(module) for module in writers), machine_code.made_for())
+    writers = (graph, load_tables, memory, numba_types, rules, series, vectors, sys.modules[__name__])
+    return digest(*(source_of(module) for module in writers), made_for())
 
 
 def llvm_text(functions: Sequence[WrittenFunction]) -> str:
@@ -175,10 +175,86 @@ def load_functions(kind: str, functions: Sequence[WrittenFunction]) -> dict[str,
     name = f"{kind}_{digest(functions_text(functions), written_by())}"
     with loading:  # a second thread must not load them again: the code that is replaced would be freed while pointers lead to it
         if name not in _loaded:
-            code = kept_bytes(f"{name}.o", lambda: machine_code.object_code(llvm_text(functions)))
+            code = kept_bytes(f"{name}.o", lambda: object_code(llvm_text(functions)))
             _loaded[name] = Loaded(code, [function.name for function in functions])
     addresses = _loaded[name].addresses
     return {each.name: Pointer.to(addresses[each.name], written_type(each.signature)) for each in functions}
 
 
 _loaded: dict[str, Loaded] = {}  # as long as the process, as pointers may be anywhere
+
+
+# As numba, and for the whole of LLVM: its passes are not safe to run from two threads of one target machine.
+_LLVM = threading.RLock()
+_ENGINES: list[Any] = []  # All code stays in memory as long as the process: pointers to it may be anywhere.
+
+
+@cache
+def processor() -> tuple[str, str]:
+    """The processor's name and the features that may be used, as LLVM writes them."""
+    from numba import config  # later, as numba fails where the package explains
+
+    settings: Any = config
+    given = settings.CPU_FEATURES
+    return settings.CPU_NAME or binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten() if given is None else given
+
+
+@cache
+def made_for() -> str:
+    """All that the same text may be compiled to different code for, as text."""
+    return "\n".join((llvmlite.__version__, binding.get_process_triple(), *processor()))
+
+
+def _target_machine() -> Any:
+    """A new machine to compile for; one that an engine runs on belongs to the engine."""
+    binding.initialize_native_target()
+    binding.initialize_native_asmprinter()
+    name, features = processor()
+    target = binding.Target.from_triple(binding.get_process_triple())
+    static = target.name.startswith("x86")  # code that is loaded where it stays needs no tables of addresses
+    options = {"reloc": "static" if static else "default", "codemodel": "jitdefault", "jit": True}
+    return target.create_target_machine(cpu=name, features=features, opt=3, **options)
+
+
+def object_code(text: str) -> bytes:
+    """The object file of LLVM's text, optimised."""
+    with _LLVM:
+        machine = _target_machine()
+        module = binding.parse_assembly(text)
+        module.data_layout = str(machine.target_data)
+        module.verify()
+        _optimise(module, machine)
+        made: bytes = machine.emit_object(module)
+    return made
+
+
+def _optimise(module: Any, machine: Any) -> None:
+    """LLVM's own passes of level 3; no vectoriser, as the text has vectors where they are worth it."""
+    if hasattr(binding, "create_pass_builder"):
+        builder = binding.create_pass_builder(machine, binding.create_pipeline_tuning_options(3))
+        builder.getModulePassManager().run(module, builder)
+        return
+    builder = binding.create_pass_manager_builder()  # before llvmlite 0.44
+    builder.opt_level = 3
+    passes = binding.create_module_pass_manager()
+    machine.add_analysis_passes(passes)
+    builder.populate(passes)
+    passes.run(module)
+
+
+class Loaded:
+    """The functions of an object file in memory, where they stay as long as the process.
+
+    Attributes
+    ----------
+    addresses
+        The address of each function by its name.
+    """
+
+    def __init__(self, code: bytes, names: Iterable[str]) -> None:
+        with _LLVM:
+            self._engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _target_machine())
+            self._engine.add_object_file(binding.ObjectFileRef.from_data(code))
+            self._engine.finalize_object()
+            _ENGINES.append(self._engine)
+            self.addresses: dict[str, int] = {name: self._engine.get_function_address(name) for name in names}

@@ -5,7 +5,7 @@ a product of two series takes for both orders a sum over coefficients that lie i
 
     sum_{j=1}^{k-1} a_j b_{k-j}    and    sum_{j=1}^{k-1} a_j b_{k+1-j}.
 
-An inner loop computes both (see `sums.py`). The terms with the newest coefficients are added after it. A series that ends, such
+An inner loop computes both (see `rules.py`). The terms with the newest coefficients are added after it. A series that ends, such
 as that of the time, needs no loop: its few terms are written out.
 """
 
@@ -19,10 +19,8 @@ from typing import Any
 from llvmlite import ir
 
 from saltus.taylor.graph import LEAVES, RECORD_WIDTH, degree
-from saltus.taylor.memory import Memory, Place
-from saltus.taylor.rules import ARITHMETIC, FUNCTIONS, by_slope
-from saltus.taylor.sums import SETTINGS, InnerLoop, Row
-from saltus.taylor.tapes import Node, Tape
+from saltus.taylor.memory import Memory, Node, Place, Tape
+from saltus.taylor.rules import ARITHMETIC, FUNCTIONS, SETTINGS, InnerLoop, Row, by_slope
 from saltus.taylor.vectors import CACHE_LINE, DOUBLE, LONG, Coefficient, Vec, add, dot, multiply, subtract
 
 

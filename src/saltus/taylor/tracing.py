@@ -9,6 +9,7 @@ from saltus.checks import LIMITS
 from saltus.errors import ParameterError, SaltusError, TraceError, near
 from saltus.systems import (
     DeclaredLoad,
+    Harmonic,
     Pulse,
     Record,
     System,
@@ -16,11 +17,11 @@ from saltus.systems import (
     constrained_acceleration,
     mass_and_force,
     normal_forces,
+    numbers,
     reactions,
     stick_margins,
 )
 from saltus.systems import substitute as substitute_numbers
-from saltus.taylor import derivatives as tangent
 from saltus.taylor.graph import (
     FRICTION,
     POINTWISE,
@@ -37,6 +38,8 @@ from saltus.taylor.load_tables import AFTER, SINCE, WITHIN
 
 if TYPE_CHECKING:
     from fractions import Fraction
+
+FREQUENCY = "load.frequency"
 
 
 class LoadTime:
@@ -93,7 +96,15 @@ class Trace:
     (`stick_margins`), and `ground_speeds`. Its leaves include `slide`, the direction in which each friction slides, 0 if it
     sticks.
 
-    With `columns` of a tangent (`derivatives.py`) `acceleration` goes on after the model's own `dof` with those of the columns.
+    With a tangent `acceleration` goes on after the model's own `dof` with that of its `columns`. Column j is the derivative to
+    the j-th initial coordinate, then to the j-th initial velocity, then to the number at the j-th of `paths`. With u = dq/dc and
+    z = dv/dc it obeys, along an arc, u' = z and
+
+        z' = a_q u + a_v z + a_c.
+
+    All derivatives are at a fixed time. If c is the forcing frequency W, one must note that the kernel's time counts from
+    `origin`, whole forcing periods after 0, and that a load depends on n W (origin + t). Therefore a_c = a_W + (origin / W) a_t,
+    where a_t leaves out the records.
     """
 
     model: str = ""  # its name
@@ -136,6 +147,49 @@ class Trace:
         self.parameters.append(path)
         return Expr("parameter", (), len(self.parameters) - 1)
 
+    def append_tangent(self, paths: tuple[str, ...]) -> None:
+        """Append the tangent's columns as further coordinates; coordinate dof + j dof + d is u_d of column j."""
+        own = list(self.acceleration)
+        self.paths, self.columns = paths, 2 * self.dof + len(paths)
+        for path, order in list(self.records):  # the time derivative at a jump of the motion needs these
+            if (path, order + 1) not in self.records:
+                self.records.append((path, order + 1))
+        for j in range(self.columns):
+            self.acceleration += [self.derivative_along(a, j) for a in own]
+
+    def tangent_leaves(self, j: int) -> tuple[list[Expr], list[Expr]]:
+        """The leaves for u and z of column j, as coordinates and velocities."""
+        places = range(self.dof * (1 + j), self.dof * (2 + j))
+        return [Expr("coordinate", (), i) for i in places], [Expr("velocity", (), i) for i in places]
+
+    def derivative_along(self, root: Expr, j: int) -> Expr:
+        """The derivative of an expression of the motion along column j, at a fixed time."""
+        total = self.partial_derivative(root, j)
+        for i, (u, z) in enumerate(zip(*self.tangent_leaves(j), strict=True)):
+            total = total + differentiate(root, Expr("coordinate", (), i)) * u
+            total = total + differentiate(root, Expr("velocity", (), i)) * z
+        return total
+
+    def partial_derivative(self, root: Expr, j: int) -> Expr:
+        """The partial derivative of an expression to column j's parameter, at a fixed time and state; 0 for the other columns."""
+        if j < 2 * self.dof:
+            return number(0.0)
+        path = self.paths[j - 2 * self.dof]
+        leaf = Expr("parameter", (), self.parameters.index(path))
+        derivative = differentiate(root, leaf)
+        if path == FREQUENCY:
+            derivative = derivative + Expr("origin") / leaf * differentiate(root, Expr("time"))
+        return derivative
+
+    def time_derivative(self, root: Expr) -> Expr:
+        """The partial derivative of an expression to the time, records included."""
+        total = differentiate(root, Expr("time"))
+        for node in ordered([root]):
+            if node.op == "record":
+                path, order = self.records[node.value]
+                total = total + differentiate(root, node) * Expr("record", (), self.records.index((path, order + 1)))
+        return total
+
 
 def trace(system: System, stop_at: tuple[str, ...] = (), sensitivities: tuple[str, ...] | None = None) -> Trace:
     """Trace the model, the load and the impact law of a system, and the margins at which a motion stops.
@@ -150,7 +204,7 @@ def trace(system: System, stop_at: tuple[str, ...] = (), sensitivities: tuple[st
     ParameterError
         The model does not have a margin, or a path leads to no number.
     """
-    paths = None if sensitivities is None else tangent.check_paths(system, sensitivities)
+    paths = None if sensitivities is None else check_paths(system, sensitivities)
     result = Trace(model=type(system.model).__name__, side_count=len(system.model.sides), dof=len(system.model.coordinates))
     twin = substitute_numbers(system, result.symbol)
     _name_records(twin.load)
@@ -172,7 +226,7 @@ def trace(system: System, stop_at: tuple[str, ...] = (), sensitivities: tuple[st
     _trace_margins(result, twin, t, q, v, side, stop_at)
     _check(result)
     if paths is not None:
-        tangent.extend(result, paths)
+        result.append_tangent(paths)
         check_size(result)
     return result
 
@@ -339,3 +393,29 @@ def _check_abs(result: Trace, expanded: list[Expr]) -> None:
     sized = {side * q for q in coordinates}
     if result.gap not in sized | {q * side for q in coordinates} and any(node in sized for node in ordered(expanded)):
         raise TraceError("abs of the coordinate can be traced only where the gap is side * coordinate; write it with the gap")
+
+
+def check_paths(system: System, paths: tuple[str, ...]) -> tuple[str, ...]:
+    """Check that each of the dotted paths to differentiate to names a number that can vary.
+
+    Raises
+    ------
+    ParameterError
+        A path leads to no number of the system (the message has similar paths), or to an order, or is given twice.
+    """
+    known = [path for path, _ in numbers(system)]
+    for path in paths:
+        if path not in known:
+            system.get(str(path))  # refuses a path to a part that does not exist
+            below = [name for name in known if name.startswith(f"{path}.")]
+            raise ParameterError(f"{path} is not a number, so there is no derivative to it; {near(str(path), below or known)}")
+        owner = system.get(path.rpartition(".")[0])
+        if isinstance(owner, Pulse) and path.rpartition(".")[2] in owner.moving:
+            raise ParameterError(
+                f"{path} moves the instants at which the load is not smooth, so there are no derivatives to it; take another"
+            )
+        if path.endswith(".order") and isinstance(owner, Harmonic):
+            raise ParameterError(f"{path} is a whole number, so there is no derivative to it; choose another parameter")
+    if len(set(paths)) < len(paths):
+        raise ParameterError(f"each parameter may be named once, got {paths!r}")
+    return tuple(paths)

@@ -15,8 +15,7 @@ from saltus.flow.contacts.complementarity import eliminate
 from saltus.flow.contacts.impacts import record_contact_event
 from saltus.flow.contacts.layout import FrictionColumn
 from saltus.flow.contacts.tangent import move_columns, note_shifts, slope
-from saltus.flow.kernel.layout import EXACT, ZERO, Mode
-from saltus.flow.kernel.memory_layout import EventCode
+from saltus.flow.kernel.layout import EXACT, ZERO, EventCode, Mode
 from saltus.flow.kernel.roots import NEVER, SIMPLE, contact_root, leading
 from saltus.flow.kernel.steps import columns_at_event, expand, step_size
 from saltus.taylor import lean_jit

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from saltus.flow.contacts.impacts import only_open
 from saltus.flow.contacts.lane_impacts import read_contacts, write_closed
-from saltus.flow.kernel.layout import Mode
-from saltus.flow.kernel.memory_layout import EventCode
+from saltus.flow.kernel.layout import EventCode, Mode
 from saltus.taylor import inline_jit, jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------

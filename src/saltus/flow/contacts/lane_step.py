@@ -14,8 +14,7 @@ from __future__ import annotations
 from saltus.flow.contacts.lane_impacts import closed_lanes, resolve_impacts, write_closed
 from saltus.flow.contacts.layout import ContactColumn, FrictionColumn
 from saltus.flow.kernel.layout import Mode
-from saltus.flow.lanes.gap_roots import find_contact
-from saltus.flow.lanes.lane_steps import both_at, commit, natural_step, row_step, series_true, state_size, sweep
+from saltus.flow.lanes.lane_steps import both_at, commit, find_contact, natural_step, row_step, series_true, state_size, sweep
 from saltus.flow.lanes.memory import FAST, Gap, Step, Stretch
 from saltus.flow.lanes.sampling import keep_ended, pass_ends, record_others, record_range
 from saltus.taylor import (

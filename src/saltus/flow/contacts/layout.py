@@ -1,8 +1,14 @@
-"""Places in the arrays that the kernel for several contacts shares with its callers, and its thresholds."""
+"""Places in the arrays that the kernel for several contacts shares with its callers, its thresholds, and the arrays in which it
+solves for impacts and closed contacts."""
 
 from __future__ import annotations
 
 from enum import IntEnum
+
+import numpy as np
+
+from saltus.flow.kernel.memory import SolverArrays
+from saltus.taylor import jit, lean_jit
 
 
 class ContactColumn(IntEnum):
@@ -83,3 +89,48 @@ FINISHED = 1e-14  # An accumulation is over if all speeds are smaller than the f
 # which accumulations of one contact within those of another are cut off: near that scale the cuts would keep the other one going.
 TRIED_AGAIN = 32  # If n impacts were followed ahead in vain, n / 32 impacts must happen before it is tried again.
 TIED = 1e-12  # Reactions smaller than this vanish together: the rounding of the loads that hold the contacts.
+
+
+@jit
+def zeros(count):
+    """An array of zeros, made in a function of its own because numba would compile `np.zeros` anew at each call of it."""
+    return np.zeros(count)
+
+
+@jit
+def rows_of_zeros(rows, columns):
+    """An array of zeros with two indices."""
+    return np.zeros((rows, columns))
+
+
+@jit
+def solver_arrays(own, count, columns, frictions):
+    """The arrays in which impacts are solved for, for so many columns of a tangent."""
+    most, numbers = max(2 * own, count + 1), own * own + count * count + count + frictions
+    return SolverArrays(
+        zeros(numbers),
+        rows_of_zeros(own, own),
+        rows_of_zeros(count, count),
+        rows_of_zeros(max(own, count), most),
+        rows_of_zeros(count, count),
+        zeros(count),
+        zeros(count),
+        zeros(count),
+        zeros(count),
+        zeros(count),
+        zeros(count),
+        zeros(count),
+        zeros(count),
+        zeros(count),
+        zeros(columns * numbers),
+        zeros(own),
+        zeros(columns),
+        rows_of_zeros(columns, count),
+    )
+
+
+@lean_jit
+def copy_all(given, target):
+    """Copy an array into another one; numba's assignment of slices would take seconds to compile."""
+    for i in range(given.size):
+        target[i] = given[i]

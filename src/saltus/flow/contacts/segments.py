@@ -30,12 +30,10 @@ from saltus.flow.contacts.impacts import (
     push,
     restitution,
 )
-from saltus.flow.contacts.layout import ContactColumn, SegmentEnd, SegmentPlan
-from saltus.flow.contacts.solver_memory import solver_arrays
+from saltus.flow.contacts.layout import ContactColumn, SegmentEnd, SegmentPlan, solver_arrays
 from saltus.flow.contacts.tangent import fill_slopes, hold_columns, impulse_columns, lift, note_velocities
-from saltus.flow.kernel.function_types import CONTACT_SEGMENTS
-from saltus.flow.kernel.memory import ContactsSegmentParts, MotionMemory
-from saltus.flow.kernel.memory_layout import EventCode
+from saltus.flow.kernel.layout import EventCode
+from saltus.flow.kernel.memory import CONTACT_SEGMENTS, ContactsSegmentParts, MotionMemory
 from saltus.flow.kernel.steps import columns_at_event, expand, move, state_arrays, step_arrays
 from saltus.taylor import by_reference, cached_jit, jit, lean_jit
 

@@ -1,4 +1,4 @@
-"""The saltation of the tangent's columns at the events of several contacts (see `taylor/derivatives.py`).
+"""The saltation of the tangent's columns at the events of several contacts (see `taylor/tracing.py`).
 
 An event's instant depends on the parameter c of a column. The columns (u, z) of coordinates and velocities are first taken to the
 derivatives of the state *at the event*, u + v dt and z + a dt, where dt is the shift of the event and a the acceleration before
@@ -17,9 +17,8 @@ import numpy as np
 
 from saltus.flow.contacts.complementarity import acting, invert
 from saltus.flow.contacts.impacts import frozen_accumulation, restitution
-from saltus.flow.contacts.layout import APART, RELATIVE_STEP, TIED, ContactColumn, ImpactDetail
-from saltus.flow.contacts.solver_memory import copy_all
-from saltus.flow.kernel.memory_layout import EventCode
+from saltus.flow.contacts.layout import APART, RELATIVE_STEP, TIED, ContactColumn, ImpactDetail, copy_all
+from saltus.flow.kernel.layout import EventCode
 from saltus.flow.kernel.steps import columns_at_event, expand
 from saltus.taylor import jit, lean_jit
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -11,14 +12,16 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from saltus.flow.contacts import choice, closings, complementarity, decisions, frictions, solver_memory, tangent
+from saltus.checks import check_names
+from saltus.flow.contacts import closings, complementarity, frictions, tangent
 from saltus.flow.contacts import impacts as contact_impacts
 from saltus.flow.contacts import kernel as contacts_kernel
 from saltus.flow.contacts import layout as contact_layout
 from saltus.flow.contacts.one_free import OneFree, equations_of_one_free
-from saltus.flow.kernel import event_derivatives, function_types, layout, loop, memory, roots, steps
+from saltus.flow.kernel import event_derivatives, layout, loop, memory, roots, steps
 from saltus.flow.kernel.memory import ContactsFunctions, OneContactFunctions
 from saltus.flow.one_contact import impacts, kernel
+from saltus.systems import System, numbers
 from saltus.taylor import (
     SCALAR,
     Case,
@@ -36,10 +39,13 @@ from saltus.taylor import (
     load_functions,
     load_module,
     number,
+    record_table,
     shared_constants,
     source_of,
+    structure_key,
     substitute,
     tape,
+    trace,
 )
 
 MOST_COEFFICIENTS = 24  # length of a series at the tightest tolerance: order 21, hence 23 coefficients, rounded up to pairs
@@ -47,11 +53,11 @@ _SIGNATURES = f"""import math
 
 import numpy as np
 
-from saltus.flow.kernel.function_types import *
+from saltus.flow.kernel.memory import *
 from saltus.flow.kernel.memory import *
 from saltus.taylor.numba_types import by_reference
 from saltus.taylor.private_numba import cached_jit, inline_jit, jit, lean_jit
-# types of {digest(source_of(function_types), source_of(memory))}
+# types of {digest(source_of(memory))}
 """
 ENV = {"parameter": ("parameters", 0), "constant": ("constants", 0), "record": ("table", 0)}
 LEAVES = ENV | {"time": ("t", 0), "origin": ("origin", 0), "side": ("side", 0)}
@@ -145,15 +151,13 @@ def contacts_module() -> ModuleType:
     """The module of the scalar kernel for models with several contacts."""
     parts = (
         contact_layout,
-        solver_memory,
         complementarity,
         contact_impacts,
         tangent,
         frictions,
-        choice,
         closings,
     )
-    text = kernel_text(layout, roots, steps, *parts, decisions, contacts_kernel, loop)
+    text = kernel_text(layout, roots, steps, *parts, contacts_kernel, loop)
     return load_module("contacts", text.replace("(ADVANCE)", "(ADVANCE_CONTACTS)"))
 
 
@@ -203,8 +207,8 @@ def structure_functions(trace: Trace) -> list[WrittenFunction]:
 
 
 def _function(name: str, places: Places, content: Sequence[Any]) -> WrittenFunction:
-    """A function of one motion; its signature has its name in `function_types.py`."""
-    return WrittenFunction(name, getattr(function_types, name.upper()), places, SCALAR, content)
+    """A function of one motion; its signature has its name in `memory.py`."""
+    return WrittenFunction(name, getattr(memory, name.upper()), places, SCALAR, content)
 
 
 def constants(trace: Trace) -> dict[Expr, int]:
@@ -311,3 +315,46 @@ def _table(name: str, places: Places, roots: list[Expr], known: dict[Expr, int])
     """A function that fills its last argument with the values of expressions of the parameters."""
     targets = [(places.arguments[-1], i) for i in range(len(roots))]
     return _function(name, places, [Case(tape(roots, known), targets)])
+
+
+@dataclass(frozen=True)
+class Program:
+    """A system ready to run: its compiled kernel and its numbers."""
+
+    trace: Trace
+    structure: Structure
+    env: tuple[Any, ...]  # parameters, constants, record breakpoints, record table
+    model: Any  # the structure's functions and the geometry of its contact
+    limits: tuple[str, ...]
+
+    def with_numbers(self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray]) -> Program:
+        """The same with other numbers."""
+        env, model = self.structure.prepare(parameters, records)
+        return replace(self, env=env, model=model)
+
+
+def program(system: System, limits: tuple[str, ...] = (), sensitivities: tuple[str, ...] | None = None) -> Program:
+    """A system ready to run, with a tangent if asked for. Its structure is traced and compiled unless it is known; its numbers
+    are only filled in."""
+    key = (structure_key(system), limits, sensitivities)
+    if key not in _structures:
+        traced = trace(system, limits, sensitivities)
+        _structures[key] = traced, load_structure(traced)
+    traced, structure = _structures[key]
+    parameters = np.array([value for _, value in numbers(system)])
+    return Program(traced, structure, *structure.prepare(parameters, record_table(system, traced.records)), tuple(traced.margins))
+
+
+_structures: dict[Any, tuple[Trace, Structure]] = {}
+
+
+def limits_of(system: System, stop_at: Iterable[str]) -> tuple[str, ...]:
+    """The margins that end a motion: the model's own stops and those asked for."""
+    lifted = [friction.limit for friction in system.model.frictions]
+    asked = check_names("stop_at", stop_at, "margins, such as ['kinematic_limit']")
+    return tuple(dict.fromkeys((*system.model.stops, *lifted, *asked)))
+
+
+def taylor_order(tol: float) -> int:
+    """The order of series that is fastest at a tolerance: 10 at 1e-6, 15 at 1e-10, 20 at 1e-14."""
+    return round(10 + 1.25 * (-math.log10(tol) - 6))

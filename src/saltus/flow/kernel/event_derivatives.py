@@ -10,17 +10,13 @@ import math
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
-from saltus.flow.kernel.memory_layout import EventCode, ReleaseDetail, RestDetail
+from saltus.flow.kernel.layout import EventCode, ReleaseDetail, RestDetail
 from saltus.taylor import (
     Expr,
     Trace,
-    derivative_along,
     differentiate,
     number,
-    partial_derivative,
     substitute,
-    tangent_leaves,
-    time_derivative,
 )
 
 NONE = number(math.nan)
@@ -61,7 +57,7 @@ def _derive_changes(trace: Trace) -> list[tuple[EventCode, int, dict[Expr, Expr]
     jump = saltation(trace)
     after, at_rest, none = _shifts(jump.shift), dict[Expr, Expr](), dict[Expr, Expr]()
     for j in range(trace.columns):
-        (u,), (z,) = tangent_leaves(trace, j)
+        (u,), (z,) = trace.tangent_leaves(j)
         held = contact_shift(trace, j)
         after |= {u: jump.coordinate[j], z: jump.velocity[j]}
         at_rest |= {u: held, z: number(0.0)}
@@ -86,10 +82,10 @@ def _reset_slopes(trace: Trace) -> dict[Expr, Expr]:
     shift."""
     assert trace.velocity_after is not None
     reset, places = trace.velocity_after, dict[Expr, Expr]()
-    slope, drift = differentiate(reset, Expr("velocity", (), 0)), time_derivative(trace, reset)
+    slope, drift = differentiate(reset, Expr("velocity", (), 0)), trace.time_derivative(reset)
     for j in range(trace.columns):
-        (u,), (z,) = tangent_leaves(trace, j)
-        places |= {u: contact_shift(trace, j), z: slope * z + partial_derivative(trace, reset, j)}
+        (u,), (z,) = trace.tangent_leaves(j)
+        places |= {u: contact_shift(trace, j), z: slope * z + trace.partial_derivative(reset, j)}
     return places | _shifts([drift] * trace.columns)
 
 
@@ -117,21 +113,21 @@ def saltation(trace: Trace) -> Saltation:
     here = {Expr("coordinate", (), 0): trace.contact}
     old = substitute(trace.acceleration[0], here)
     new = substitute(trace.acceleration[0], here | {before: reset, Expr("side"): trace.next_side})
-    slope, drift = differentiate(reset, before), time_derivative(trace, reset)
+    slope, drift = differentiate(reset, before), trace.time_derivative(reset)
     result = Saltation([], [], [])
     for j in range(trace.columns):
-        (u,), (z,) = tangent_leaves(trace, j)
-        shift = -(trace.gap_rate * u + substitute(partial_derivative(trace, trace.gap, j), here)) / (trace.gap_rate * before)
+        (u,), (z,) = trace.tangent_leaves(j)
+        shift = -(trace.gap_rate * u + substitute(trace.partial_derivative(trace.gap, j), here)) / (trace.gap_rate * before)
         result.shift.append(shift)
         result.coordinate.append(contact_shift(trace, j) - reset * shift)
-        result.velocity.append(slope * (z + old * shift) + (drift - new) * shift + partial_derivative(trace, reset, j))
+        result.velocity.append(slope * (z + old * shift) + (drift - new) * shift + trace.partial_derivative(reset, j))
     return result
 
 
 def contact_shift(trace: Trace, j: int) -> Expr:
     """The derivative x_c of the point of contact to column j's parameter. At rest there, u is x_c and z is 0."""
     assert trace.contact is not None
-    return partial_derivative(trace, trace.contact, j)
+    return trace.partial_derivative(trace.contact, j)
 
 
 def release_shift(trace: Trace) -> list[Expr]:
@@ -141,10 +137,10 @@ def release_shift(trace: Trace) -> list[Expr]:
     """
     pull = trace.contact_acceleration
     assert pull is not None
-    slope = time_derivative(trace, pull)
+    slope = trace.time_derivative(pull)
     if slope is number(0.0):
         return [number(math.nan)] * trace.columns
-    return [-partial_derivative(trace, pull, j) / slope for j in range(trace.columns)]
+    return [-trace.partial_derivative(pull, j) / slope for j in range(trace.columns)]
 
 
 def rest_shift(trace: Trace) -> list[Expr]:
@@ -156,11 +152,11 @@ def rest_shift(trace: Trace) -> list[Expr]:
     """
     v, left = Expr("velocity", (), 0), time_left(trace)
     acceleration = substitute(trace.acceleration[0], {Expr("coordinate", (), 0): trace.contact})
-    slope, drift, result = differentiate(left, v), time_derivative(trace, left), []
+    slope, drift, result = differentiate(left, v), trace.time_derivative(left), []
     for j in range(trace.columns):
-        (u,), (z,) = tangent_leaves(trace, j)
+        (u,), (z,) = trace.tangent_leaves(j)
         shift = (contact_shift(trace, j) - u) / v
-        result.append(shift + slope * (z + acceleration * shift) + drift * shift + partial_derivative(trace, left, j))
+        result.append(shift + slope * (z + acceleration * shift) + drift * shift + trace.partial_derivative(left, j))
     return result
 
 
@@ -182,13 +178,13 @@ def time_left(trace: Trace) -> Expr:
 
 def number_slopes(trace: Trace) -> list[Expr]:
     """The derivatives, along each column, of the numbers that events at contacts need; one column after the other."""
-    return [derivative_along(trace, x, j) for j in range(trace.columns) for x in trace.contact_numbers]
+    return [trace.derivative_along(x, j) for j in range(trace.columns) for x in trace.contact_numbers]
 
 
 def reaction_slopes(trace: Trace, reaction: Expr) -> list[Expr]:
     """The derivative of a reaction along each column at a fixed time: -dt times the reaction's rate, where it reaches 0."""
     accelerations = {Expr("acceleration", (), i): a for i, a in enumerate(trace.acceleration[: trace.dof])}
-    return [derivative_along(trace, substitute(reaction, accelerations), j) for j in range(trace.columns)]
+    return [trace.derivative_along(substitute(reaction, accelerations), j) for j in range(trace.columns)]
 
 
 def margin_shift(trace: Trace, margin: Expr) -> list[Expr]:
@@ -196,8 +192,8 @@ def margin_shift(trace: Trace, margin: Expr) -> list[Expr]:
     where a is substituted by the model's acceleration."""
     a = trace.acceleration[: trace.dof]
     margin = substitute(margin, {Expr("acceleration", (), i): a[i] for i in range(trace.dof)})
-    speed = time_derivative(trace, margin)
+    speed = trace.time_derivative(margin)
     for i in range(trace.dof):
         speed = speed + differentiate(margin, Expr("coordinate", (), i)) * Expr("velocity", (), i)
         speed = speed + differentiate(margin, Expr("velocity", (), i)) * a[i]
-    return [-derivative_along(trace, margin, j) / speed for j in range(trace.columns)]
+    return [-trace.derivative_along(margin, j) / speed for j in range(trace.columns)]

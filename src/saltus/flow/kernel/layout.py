@@ -1,4 +1,5 @@
-"""Definitions that the scalar kernel shares with its callers: modes, reasons to return, places in its arrays, and thresholds.
+"""Definitions that the scalar kernel shares with its callers: modes, reasons to return, events, places in its arrays, and
+thresholds; and the rule for the side on which a state moves on, which lanes share.
 
 Members of the enumerations become plain numbers in the compiled text (see `compiled_part`). The thresholds below the marker are
 compiled together with the kernel.
@@ -9,6 +10,40 @@ from __future__ import annotations
 from enum import IntEnum
 
 import numpy as np
+
+from saltus.taylor import lean_jit
+
+
+class EventCode(IntEnum):
+    """The kinds of events of a motion; the generated function `tangent` takes them as an argument."""
+
+    IMPACT = 0
+    GRAZING = 1
+    REST = 2
+    RELEASE = 3
+    CHATTER = 4
+    LIMIT = 5
+    HELD = 6
+    STICK = 7
+    SLIP = 8
+    REVERSAL = 9
+    RESET_SLOPES = 10  # no event, but a request to `tangent`: the derivatives of the reset alone, at a fixed instant
+
+
+class RestDetail(IntEnum):
+    """The way in which a system comes to rest, which decides the derivatives at rest."""
+
+    AFTER_IMPACTS = 0  # as the limit of an accumulation of impacts
+    AT_ONCE = 1  # after an impact that leaves no speed; motions from neighbouring states come to rest soon after
+    NEVER_AGAIN = 2  # at once, but impacts lose nothing, so that motions from neighbouring states never come to rest
+
+
+class ReleaseDetail(IntEnum):
+    """The cause of a release from rest, which decides the derivatives of the release."""
+
+    AT_A_ROOT = 0  # a simple root of the contact acceleration
+    AT_A_JUMP = 1  # a jump of the contact acceleration through zero, whose time the load fixes
+    AT_NONE = 2  # neither, so that the release has no derivative
 
 
 class Mode(IntEnum):
@@ -77,6 +112,10 @@ class SegmentColumn(IntEnum):
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
+LOWEST_ORDER, HIGHEST_ORDER = 14, 22  # of a lane's series, at 1e-6 and at 1e-15; even, as coefficients are made in pairs
+SERIES_LENGTH = HIGHEST_ORDER + 1
+
+
 # The length of a step.
 SAFETY = 0.9  # The error of a step is then a tenth of tol, and the energy drifts by less than 1e-12 in 1000 periods.
 GAP = 0.65  # largest difference of the log radius of convergence by the last terms and by earlier ones: 0.6 for a sine
@@ -98,3 +137,30 @@ CHATTER_SPEED = 1e-5  # Here the averaged law has an error of 5e-5 of the speed,
 SLOWLY = 0.02  # the largest change of the contact accelerations over two impacts for which the averaged law is used
 GAUSS_NODES = np.array([0.0694318442029737, 0.3300094782075719, 0.6699905217924281, 0.9305681557970263])
 GAUSS_WEIGHTS = np.array([0.1739274225687269, 0.3260725774312731, 0.3260725774312731, 0.1739274225687269])
+
+
+@lean_jit
+def side_of_state(sides, position, velocity, geometry):
+    """The mode and the side of a state: from the gap; at the contact from the velocity; at rest there the mode CONTACT decides.
+
+    The mode is BEYOND if the state lies on no side of the contact. A motion that starts at the contact with a velocity that
+    closes the gap of every side is on an ARC that begins with its impact.
+    """
+    if sides == 0:
+        return Mode.ARC, 1
+    into, open_side, pressed = 0, 0, False
+    for i in range(sides):
+        side, rate = 1 - 2 * i, geometry[Geometry.RATE_UP + i]
+        gap = rate * (position - geometry[Geometry.CONTACT])
+        if gap > 0.0 and open_side == 0:
+            open_side = side
+        pressed = pressed or gap < 0.0
+        if rate * velocity > 0.0 and into == 0:
+            into = side
+    if open_side != 0:
+        return Mode.ARC, open_side
+    if pressed:
+        return Mode.BEYOND, 1
+    if velocity == 0.0:
+        return Mode.CONTACT, 1
+    return (Mode.CONTACT, into) if into != 0 else (Mode.ARC, 1)

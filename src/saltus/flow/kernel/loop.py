@@ -6,9 +6,8 @@ functions of the same names.
 
 from __future__ import annotations
 
-from saltus.flow.kernel.function_types import ADVANCE
 from saltus.flow.kernel.layout import BATCH, Status
-from saltus.flow.kernel.memory import MotionMemory
+from saltus.flow.kernel.memory import ADVANCE, MotionMemory
 from saltus.flow.kernel.steps import next_target, state_arrays
 from saltus.flow.one_contact.kernel import begin, is_smooth, one_pass, parts_of, waits
 from saltus.taylor import by_reference, cached_jit, lean_jit

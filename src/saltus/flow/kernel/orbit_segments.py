@@ -8,17 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow.contacts import complementarity, extremes, solver_memory, tangent
+from saltus.flow.contacts import complementarity, extremes, tangent
 from saltus.flow.contacts import impacts as contact_impacts
 from saltus.flow.contacts import layout as contact_layout
 from saltus.flow.contacts import segments as contact_segments
 from saltus.flow.contacts.layout import ContactColumn, SegmentEnd, SegmentExtremes
 from saltus.flow.kernel import layout, roots, steps
-from saltus.flow.kernel.compiled import kernel_text
+from saltus.flow.kernel.compiled import Program, kernel_text, taylor_order
 from saltus.flow.kernel.layout import SegmentColumn, SegmentValue
 from saltus.flow.kernel.memory import ContactsSegmentResults, SegmentResults, motion_record
-from saltus.flow.kernel.structures import Program, taylor_order
-from saltus.flow.one_contact import impacts, segments, sides
+from saltus.flow.one_contact import impacts, segments
 from saltus.taylor import entry_point, load_module
 
 
@@ -26,14 +25,14 @@ from saltus.taylor import entry_point, load_module
 def load_segments() -> tuple[Callable[..., int], Callable[..., None]]:
     """The functions with which periodic orbits are solved: `follow_segments` and `impact_equations` of
     `one_contact/segments.py`."""
-    module = load_module("segments", kernel_text(layout, roots, steps, impacts, sides, segments))
+    module = load_module("segments", kernel_text(layout, roots, steps, impacts, segments))
     return entry_point(module.follow_segments), entry_point(module.impact_equations)
 
 
 @cache
 def load_contact_segments() -> Callable[..., int]:
     """The function with which orbits with several contacts are solved, `follow_contact_segments` of `contacts/segments.py`."""
-    parts = (contact_layout, solver_memory, complementarity, contact_impacts, tangent, extremes, contact_segments)
+    parts = (contact_layout, complementarity, contact_impacts, tangent, extremes, contact_segments)
     return entry_point(load_module("contact_segments", kernel_text(layout, roots, steps, *parts)).follow_contact_segments)
 
 

@@ -9,9 +9,8 @@ import math
 
 import numpy as np
 
-from saltus.flow.kernel.layout import DEFECT, GAP, ROUGHER, SAFETY, SMALLEST
+from saltus.flow.kernel.layout import DEFECT, GAP, ROUGHER, SAFETY, SMALLEST, EventCode
 from saltus.flow.kernel.memory import StateArrays, StepArrays
-from saltus.flow.kernel.memory_layout import EventCode
 from saltus.flow.kernel.roots import horner
 from saltus.taylor import jit, lean_jit
 

@@ -4,37 +4,43 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from types import ModuleType
 from typing import Any
 
-from saltus.flow.contacts import complementarity, lane_handoff, lane_impacts, scalar_impact, solver_memory
+from saltus.flow.contacts import complementarity, lane_handoff, lane_impacts, scalar_impact
 from saltus.flow.contacts import impacts as contact_impacts
 from saltus.flow.contacts import lane_step as contacts_step
 from saltus.flow.contacts import layout as contact_layout
-from saltus.flow.kernel import function_types as scalar_types
 from saltus.flow.kernel import layout as kernel_layout
 from saltus.flow.kernel import memory as kernel_memory
-from saltus.flow.kernel import memory_layout, roots, steps
-from saltus.flow.kernel.compiled import contacts_module, kernel_module
+from saltus.flow.kernel import roots, steps
+from saltus.flow.kernel.compiled import constants, contacts_module, kernel_module, motion_roots, one_free
+from saltus.flow.kernel.event_derivatives import saltation
+from saltus.flow.kernel.layout import SERIES_LENGTH
 from saltus.flow.lanes import (
     driver,
     forcing_periods,
     function_types,
-    gap_roots,
     handoff,
     lane_steps,
     memory,
     sampling,
 )
-from saltus.flow.lanes.lane_functions import lane_functions, memory_plan
-from saltus.flow.lanes.memory import MemoryPlan
+from saltus.flow.lanes.memory import SLOTS, MemoryPlan
 from saltus.flow.one_contact import lane_handoff as one_contact_handoff
-from saltus.flow.one_contact import lane_step, sides
+from saltus.flow.one_contact import lane_step
 from saltus.taylor import (
+    LANES,
     WIDTH,
+    Case,
+    Expr,
+    Places,
+    Rows,
+    SeriesOf,
     Trace,
+    WrittenFunction,
     check_size,
     compiled_part,
     digest,
@@ -48,10 +54,11 @@ from saltus.taylor import (
     module_name,
     pointer,
     source_of,
+    tape,
     vectors,
 )
 
-_TYPES = (scalar_types, kernel_memory, function_types, memory, vectors, lane_memory, lane_vectors)
+_TYPES = (kernel_memory, function_types, memory, vectors, lane_memory, lane_vectors)
 _WRITTEN_BY = digest(*(source_of(module) for module in _TYPES))
 _SIGNATURES = f"""import math
 
@@ -78,7 +85,7 @@ def load_driver(several: bool = False) -> Callable[..., None]:
 
 def _driver_text(several: bool) -> str:
     step = (contact_layout, lane_impacts, contacts_step) if several else (lane_step,)
-    common = (memory_layout, kernel_layout, memory, sides, load_tables, lane_steps, gap_roots, sampling)
+    common = (kernel_layout, memory, load_tables, lane_steps, sampling)
     return _text(several, *common, *step, forcing_periods, driver)
 
 
@@ -108,10 +115,10 @@ def compile_driver_aside(several: bool) -> subprocess.Popen[bytes] | None:
 def load_helpers(several: bool = False) -> tuple[Any, ...]:
     """The functions that the driver calls for one lane, in the order of `Helpers`."""
     names = ["first_root_of", "turning_range", "scalar_motion"]
-    parts = [memory_layout, kernel_layout, memory, load_tables, roots]
+    parts = [kernel_layout, memory, load_tables, roots]
     if several:
         names.append("contacts_impact")
-        parts += [steps, contact_layout, solver_memory, complementarity, contact_impacts, lane_impacts, lane_handoff]
+        parts += [steps, contact_layout, complementarity, contact_impacts, lane_impacts, lane_handoff]
         parts += [handoff, scalar_impact]
     else:
         parts += [one_contact_handoff, handoff]
@@ -149,3 +156,112 @@ def compile_beside(driver: subprocess.Popen[bytes], several: bool) -> None:
     load_helpers(several)
     load_advance(several)
     driver.wait()
+
+
+def memory_plan(trace: Trace) -> MemoryPlan:
+    """The memory that a structure needs."""
+    equations = one_free(trace)
+    return MemoryPlan(
+        rows=len(trace.acceleration),
+        own=trace.dof,
+        parameters=max(0 if trace.several else 1, len(trace.parameters)),
+        contacts=len(trace.signs),
+        frictions=len(trace.friction_coordinates),
+        constants=max(1, len(constants(trace))),
+        records=len(trace.records),
+        stops=len(trace.reactions) + len(trace.margins),
+        guards=len(equations.guards) if equations else None,
+        constant_guards=len(equations.constant_guards) if equations else 0,
+    )
+
+
+def lane_functions(trace: Trace) -> list[WrittenFunction]:
+    """`lane_series`, `lane_impact` and `lane_field`; for a model with several contacts also of `lane_one_free`."""
+    plan, known = memory_plan(trace), constants(trace)
+    functions = [_series(trace, plan, known), _impact(trace, plan, known), _field(trace, plan, known)]
+    return [*functions, _one_free(trace, plan, known)] if trace.several else functions
+
+
+def _function(name: str, places: Places, content: Sequence[Any]) -> WrittenFunction:
+    """A function of the lanes; its signature has its name in `function_types.py`."""
+    return WrittenFunction(name, getattr(function_types, name.upper()), places, LANES, content)
+
+
+def _leaves(plan: MemoryPlan, time: int, position: int, velocity: int) -> dict[str, tuple[str, int]]:
+    """The places of a trace's leaves in the lanes' memory, for one of the times and one of the states that it holds."""
+    parts = {"coordinate": position, "velocity": velocity, "parameter": plan.places.parameters, "free": plan.places.free}
+    parts |= {"constant": plan.places.constants, "record": plan.places.records}
+    numbers = {"time": time, "record_time": SLOTS.now, "origin": SLOTS.origin, "side": SLOTS.side}
+    parts["slide"] = parts["parameter"] + plan.parameters
+    return {op: ("m", slot) for op, slot in (parts | numbers).items()}
+
+
+def _series(trace: Trace, plan: MemoryPlan, known: dict[Expr, int]) -> WrittenFunction:
+    """`lane_series(m, order)`: the series of positions and velocities from the state, of the accelerations and of the margins.
+
+    Positions and velocities have coefficients 0..order, the others 0..order - 1; the order is even, and at least LOWEST_ORDER.
+    """
+
+    def rows(part: int, count: int) -> list[tuple[str, int]]:
+        return [("m", part + row * SERIES_LENGTH) for row in range(count)]
+
+    columns, parts = [None] * (plan.rows - plan.own), plan.places
+    targets = [*rows(parts.accelerations, plan.own), *columns, *rows(parts.margins, plan.stops)]
+    positions, velocities = rows(parts.positions, plan.rows), rows(parts.velocities, plan.rows)
+    margins = motion_roots(trace)[trace.gap is not None :]
+    layout = Rows(positions, velocities, targets, SERIES_LENGTH, any_order=False)
+    places = Places(("m", "order"), _leaves(plan, SLOTS.now, parts.position, parts.velocity))
+    return _function("lane_series", places, SeriesOf(layout, tape([*trace.acceleration, *margins], known, series=True)))
+
+
+def _one_free(trace: Trace, plan: MemoryPlan, known: dict[Expr, int]) -> WrittenFunction:
+    """`lane_one_free(m, order)`: the same series if one coordinate is free, which is in row 0.
+
+    The series of `OneFree.curved` are in the rows of the other coordinates, and the guards in the rows of margins.
+    """
+    parts = plan.places
+    leaves = _leaves(plan, SLOTS.now, parts.position, parts.velocity)
+    leaves |= {"coordinate": ("m", SLOTS.free_position), "velocity": ("m", SLOTS.free_velocity)}
+    places, equations = Places(("m", "order"), leaves), one_free(trace)
+    if equations is None:
+        return _function("lane_one_free", places, [])
+    guards = [("m", parts.margins + i * SERIES_LENGTH) for i in range(len(equations.guards))]
+    numbers = [("m", parts.constant_guards + i) for i in range(len(equations.constant_guards))]
+    curved = [("m", parts.positions + i * SERIES_LENGTH) for i in range(1, plan.own)]
+    targets = [("m", parts.accelerations), *curved, *guards]
+    state = [("m", parts.positions)], [("m", parts.velocities)]
+    rows = Rows(*state, targets, SERIES_LENGTH, any_order=False, numbers=numbers)
+    return _function("lane_one_free", places, SeriesOf(rows, tape(equations.roots, known, series=True)))
+
+
+def _impact(trace: Trace, plan: MemoryPlan, known: dict[Expr, int]) -> WrittenFunction:
+    """`lane_impact(m)`: the side, positions and velocities after an impact at the new state, the tangent's columns included.
+
+    For a model with several contacts it fills only the mass matrix and E at the new state.
+    """
+    parts = plan.places
+    if trace.several:
+        entries = {parts.mass: trace.mass, parts.restitution: trace.restitution}
+        filled = {("m", part + i): root for part, roots in entries.items() for i, root in enumerate(roots)}
+        return _at_new_state("lane_impact", plan, filled, known)
+    if trace.contact is None or trace.next_side is None or trace.velocity_after is None:
+        return _at_new_state("lane_impact", plan, {}, known)
+    positions, velocities = [trace.contact], [trace.velocity_after]
+    if trace.columns:
+        jump = saltation(trace)
+        positions, velocities = positions + jump.coordinate, velocities + jump.velocity
+    results = {("m", SLOTS.new_side): trace.next_side}
+    for part, rows in ((parts.after_position, positions), (parts.after_velocity, velocities)):
+        results |= {("m", part + row): root for row, root in enumerate(rows)}
+    return _at_new_state("lane_impact", plan, results, known)
+
+
+def _field(trace: Trace, plan: MemoryPlan, known: dict[Expr, int]) -> WrittenFunction:
+    """`lane_field(m)`: the accelerations at the new state, in the place of the velocities after an impact."""
+    first = plan.places.after_velocity
+    return _at_new_state("lane_field", plan, {("m", first + row): a for row, a in enumerate(trace.acceleration)}, known)
+
+
+def _at_new_state(name: str, plan: MemoryPlan, results: dict[tuple[str, int], Expr], known: dict[Expr, int]) -> WrittenFunction:
+    places = Places(("m",), _leaves(plan, SLOTS.new_time, plan.places.new_position, plan.places.new_velocity))
+    return _function(name, places, [Case(tape(list(results.values()), known), list(results))])

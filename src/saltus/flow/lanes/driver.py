@@ -1,7 +1,7 @@
 """A group of lanes that moves many trajectories at once. Each lane has its own time, step, side and parameters, and takes the
 next trajectory when its own has ended.
 
-The compiled parts of `kernel/layout.py`, `memory.py`, `one_contact/sides.py`, `lane_steps.py`, `gap_roots.py`, `sampling.py`,
+The compiled parts of `kernel/layout.py`, `memory.py`, `lane_steps.py`, `sampling.py`,
 `one_contact/lane_step.py`, `forcing_periods.py` and this file are one module, compiled once for all models, for the width of
 this machine's registers. The functions of a structure, `code`, come through pointers. For models with several contacts there is
 a second module with `contacts/lane_step.py` in the place of `one_contact/lane_step.py`.

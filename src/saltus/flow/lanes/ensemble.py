@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from saltus.checks import check_memory, check_number, check_work
+from saltus.flow.kernel.compiled import Program, limits_of, program
 from saltus.flow.kernel.layout import Mode, Status
-from saltus.flow.kernel.structures import Program, limits_of, program
 from saltus.flow.lanes.capture_speeds import capture_speeds
 from saltus.flow.lanes.compiled_lanes import compile_beside, compile_driver_aside, compile_everything, load_lane_functions
 from saltus.flow.lanes.ensemble_dataset import to_dataset
@@ -19,7 +19,7 @@ from saltus.flow.lanes.inputs import Inputs, read_inputs
 from saltus.flow.lanes.memory import JOB
 from saltus.flow.lanes.options import EnsembleOptions, Sample, Until, read_last, read_names, read_side, read_threads
 from saltus.flow.lanes.threads import Jobs, Lanes
-from saltus.flow.motion.request import Clock, clock
+from saltus.flow.motion.simulate import Clock, clock
 from saltus.progress import Progress, silent
 from saltus.public_functions import Numbers
 from saltus.systems import System, check_system, numbers

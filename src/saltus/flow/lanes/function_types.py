@@ -1,4 +1,4 @@
-"""The numba types of a group of lanes and of its functions that are called through pointers (see `kernel/function_types.py`).
+"""The numba types of a group of lanes and of its functions that are called through pointers (see `kernel/memory.py`).
 
 Models with one contact or none, and models with several, have a type of group each; `shared`, `RUN_LANES` and the others below
 are those of the former, and `of_contacts` those of the latter.
@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import from_dtype, types
 
-from saltus.flow.kernel.function_types import (
+from saltus.flow.kernel.memory import (
     ADVANCE,
     ADVANCE_CONTACTS,
     CONSTANTS,
@@ -20,8 +20,8 @@ from saltus.flow.kernel.function_types import (
     MATRICES,
     MODEL,
     NUMBERS,
+    SolverArrays,
 )
-from saltus.flow.kernel.memory import SolverArrays
 from saltus.flow.lanes.memory import (
     END,
     FLAGS,

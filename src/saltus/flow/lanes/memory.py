@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from saltus.flow.kernel.memory_layout import SERIES_LENGTH
+from saltus.flow.kernel.layout import SERIES_LENGTH
 from saltus.taylor import RECORD_WIDTH
 
 

@@ -13,12 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow.contacts.layout import ContactColumn
-from saltus.flow.contacts.solver_memory import solver_arrays
-from saltus.flow.kernel.layout import CHATTER_SPEED, ROUGHER, SHORTEST, SLOW
+from saltus.flow.contacts.layout import ContactColumn, solver_arrays
+from saltus.flow.kernel.compiled import Program, taylor_order
+from saltus.flow.kernel.layout import CHATTER_SPEED, ROUGHER, SERIES_LENGTH, SHORTEST, SLOW
 from saltus.flow.kernel.memory import MOTION
-from saltus.flow.kernel.memory_layout import SERIES_LENGTH
-from saltus.flow.kernel.structures import Program, taylor_order
 from saltus.flow.lanes.compiled_lanes import compile_everything, load_advance, load_driver, load_helpers
 from saltus.flow.lanes.lane_steps import step_limits
 from saltus.flow.lanes.memory import (
@@ -321,7 +319,7 @@ class Lanes:
 
 
 def lane_order(tol: float) -> int:
-    """The order of series in lanes: 14 at 1e-6, 18 at 1e-10, 22 at 1e-14; always even (see `kernel/memory_layout.py`).
+    """The order of series in lanes: 14 at 1e-6, 18 at 1e-10, 22 at 1e-14; always even (see `kernel/layout.py`).
 
     An order higher by two takes up to 5 % less time. But if the last coefficients nearly vanish, a step is too long by some
     factor, and the error too large by this factor to the power of the order.

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.enumerations import NumberedSentence
-from saltus.flow.kernel.structures import limits_of
+from saltus.flow.kernel.compiled import limits_of
 from saltus.flow.lanes.ensemble import run_ensemble, simulate_many
 from saltus.flow.lanes.ensemble_result import EnsembleResult
 from saltus.flow.lanes.inputs import read_inputs

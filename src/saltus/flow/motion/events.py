@@ -138,7 +138,7 @@ class MotionEvents(Sequence[Event]):
 
     @property
     def details(self) -> np.ndarray:
-        """The detail that the kernel recorded with each event, see `kernel/memory_layout.py`; for a limit the number of the
+        """The detail that the kernel recorded with each event, see `kernel/layout.py`; for a limit the number of the
         margin."""
         return self._labels[:, 3]
 

@@ -11,13 +11,11 @@ import numpy as np
 
 from saltus.checks import check_names, instants
 from saltus.flow.contacts.layout import ImpactDetail
-from saltus.flow.kernel.layout import GrazingDetail
-from saltus.flow.kernel.memory_layout import RestDetail
-from saltus.flow.kernel.structures import Program
+from saltus.flow.kernel.compiled import Program
+from saltus.flow.kernel.layout import GrazingDetail, RestDetail
 from saltus.flow.motion.events import EventKind, Stop
 from saltus.flow.motion.motion import Motion, state_names
-from saltus.flow.motion.request import MotionRequest
-from saltus.flow.motion.simulate import Followed, follow
+from saltus.flow.motion.simulate import Followed, MotionRequest, follow
 from saltus.flow.motion.validity import DenseOutput
 from saltus.progress import Progress, silent
 from saltus.public_functions import Numbers

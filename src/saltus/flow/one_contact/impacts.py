@@ -15,12 +15,14 @@ from saltus.flow.kernel.layout import (
     SLOW,
     SLOWLY,
     TINY,
+    EventCode,
     Geometry,
     GrazingDetail,
     Mode,
+    ReleaseDetail,
+    RestDetail,
     Status,
 )
-from saltus.flow.kernel.memory_layout import EventCode, ReleaseDetail, RestDetail
 from saltus.flow.kernel.roots import horner, leading
 from saltus.flow.kernel.steps import columns_at_event, forget, motion_end, record_event, record_shift, record_step
 from saltus.taylor import lean_jit

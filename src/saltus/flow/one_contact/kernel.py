@@ -15,9 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.flow.kernel.layout import CHATTER_SPEED, EXACT, SHORTEST, GrazingDetail, Mode, Status
+from saltus.flow.kernel.layout import CHATTER_SPEED, EXACT, SHORTEST, EventCode, GrazingDetail, Mode, Status
 from saltus.flow.kernel.memory import OneContactParts
-from saltus.flow.kernel.memory_layout import EventCode
 from saltus.flow.kernel.roots import NEVER, SIMPLE, contact_root, first_root, horner, leading, margin_root, scale_gap
 from saltus.flow.kernel.steps import (
     column_step,

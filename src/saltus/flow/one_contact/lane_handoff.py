@@ -6,9 +6,8 @@ several contacts.
 
 from __future__ import annotations
 
-from saltus.flow.kernel.layout import Geometry, Mode
+from saltus.flow.kernel.layout import EventCode, Geometry, Mode
 from saltus.flow.kernel.memory import OneContactFunctions
-from saltus.flow.kernel.memory_layout import EventCode
 from saltus.taylor import inline_jit, jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------

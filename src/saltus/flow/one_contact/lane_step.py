@@ -5,12 +5,19 @@ Its compiled part goes into one module with that of `lanes/driver.py`; `contacts
 
 from __future__ import annotations
 
-from saltus.flow.kernel.layout import CHATTER_SPEED, LOSSLESS
-from saltus.flow.lanes.gap_roots import find_contact
-from saltus.flow.lanes.lane_steps import both_at, commit, margins_certain, natural_step, series_true, state_size, sweep
+from saltus.flow.kernel.layout import CHATTER_SPEED, LOSSLESS, side_of_state
+from saltus.flow.lanes.lane_steps import (
+    both_at,
+    commit,
+    find_contact,
+    margins_certain,
+    natural_step,
+    series_true,
+    state_size,
+    sweep,
+)
 from saltus.flow.lanes.memory import FAST, SMALLEST_SHARE, Gap, Step, Stretch
 from saltus.flow.lanes.sampling import pass_ends, record_others, record_range
-from saltus.flow.one_contact.sides import side_of_state
 from saltus.taylor import absolute, bits, fma, inline_jit, lean_jit, mask, minimum, select, splat
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------

@@ -13,14 +13,11 @@ import math
 
 import numpy as np
 
-from saltus.flow.kernel.function_types import IMPACT_EQUATIONS, SEGMENTS
-from saltus.flow.kernel.layout import Geometry, SegmentColumn, SegmentValue
-from saltus.flow.kernel.memory import MotionMemory, OneContactSegmentParts
-from saltus.flow.kernel.memory_layout import EventCode
+from saltus.flow.kernel.layout import EventCode, Geometry, SegmentColumn, SegmentValue, side_of_state
+from saltus.flow.kernel.memory import IMPACT_EQUATIONS, SEGMENTS, MotionMemory, OneContactSegmentParts
 from saltus.flow.kernel.roots import NOISE, SIMPLE, contact_root, excluded, horner, roots_within, scale_gap
 from saltus.flow.kernel.steps import column_step, columns_at_event, expand, leaps, move, state_arrays, step_arrays, step_size
 from saltus.flow.one_contact.impacts import rate_of, set_state
-from saltus.flow.one_contact.sides import side_of_state
 from saltus.taylor import by_reference, cached_jit, jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------

@@ -1,20 +1,163 @@
-"""The records of a motion while it is computed: all of its steps, the states at given times, or its events alone."""
+"""What Python and the scalar kernels share of one motion: the kernel's state, from the start to the end, and the records that it
+fills: all steps of the motion, the states at given times, or its events alone."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from saltus.checks import LIMITS, free_memory
-from saltus.errors import MotionError
-from saltus.flow.kernel.memory import EventBuffers, StepBuffers
-from saltus.flow.kernel.memory_layout import EventCode
+from saltus.errors import MotionError, ParameterError
+from saltus.flow.contacts.layout import ContactColumn, FrictionColumn
+from saltus.flow.kernel.compiled import Program, load_contacts_kernel, load_kernel, taylor_order
+from saltus.flow.kernel.layout import EventCode, Mode, side_of_state
+from saltus.flow.kernel.memory import EventBuffers, StepBuffers, motion_record
 from saltus.flow.motion.events import ContactEvents, MotionEvents
 from saltus.flow.motion.motion import Samples
-from saltus.flow.motion.request import MotionRequest
 from saltus.flow.motion.validity import DenseOutput, Validity, ValidityCheck
+
+if TYPE_CHECKING:
+    from saltus.flow.motion.simulate import MotionRequest
+
+
+@dataclass(frozen=True, eq=False)
+class KernelState:
+    """What the kernel changes: the numbers of a motion, and its state."""
+
+    array: np.ndarray  # one record MOTION
+    state: np.ndarray  # coordinates and velocities, each followed by the tangent's columns, and the shifts
+    rows: np.ndarray = field(default_factory=lambda: np.zeros((0, len(ContactColumn)), dtype=np.int64))  # of several contacts
+
+    @property
+    def numbers(self) -> Any:
+        """The numbers of the motion, by the names of MOTION."""
+        return self.array[0]
+
+    @classmethod
+    def at_start(cls, request: MotionRequest, run: Program) -> Self:
+        """The state in which a motion starts.
+
+        Raises
+        ------
+        ParameterError
+            The state lies beyond the contact, or the model's gap or reset is impossible.
+        """
+        array, at = motion_record(taylor_order(request.tol), run.structure.sizes), request.clock
+        now = array[0]
+        now["period"], now["last_period"] = int(at.first), int(at.last)
+        now["time"], now["end"], now["period_length"], now["tolerance"] = at.local, at.end, at.length, request.tol
+        now["piece"] = np.searchsorted(run.env[2], request.time, side="right")
+        now["leave_by"] = request.side or 0
+        now["dense"] = int(request.dense or request.sample_times is not None)
+        now["mode"], now["side"] = _mode_and_side(request, run)
+        return cls(array, _first_state(run, request.position, request.speeds))
+
+    def advance(self, run: Program, steps: StepBuffers, events: EventBuffers) -> int:
+        """Call the kernel; returns the `Status` with which it stops."""
+        return self._kernel()(self.array, self.state, run.env, run.model, self.rows, (steps, events))
+
+    def _kernel(self) -> Callable[..., int]:
+        return load_kernel()
+
+    @property
+    def time(self) -> float:
+        """The dimensionless time."""
+        return float(self.numbers["period"] * self.numbers["period_length"] + self.numbers["time"])
+
+    @property
+    def end_time(self) -> float:
+        """The time at which the motion ends, unless something ends it earlier."""
+        return float(self.numbers["last_period"] * self.numbers["period_length"] + self.numbers["end"])
+
+    @property
+    def position(self) -> np.ndarray:
+        """The model's own coordinates."""
+        return self.state[: self.numbers["own"]]
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """Their velocities."""
+        return self.state[self.numbers["dof"] : self.numbers["dof"] + self.numbers["own"]]
+
+    @property
+    def side(self) -> int:
+        """+1 or -1, and 0 at rest."""
+        return 0 if self.numbers["mode"] in (Mode.REST, Mode.CHATTER) else int(self.numbers["side"])
+
+    @property
+    def columns(self) -> np.ndarray:
+        """The tangent's columns, (2 own coordinates, columns): the rows of the coordinates, then those of the velocities."""
+        own, shape = self.numbers["own"], (2, 1 + self.numbers["columns"], self.numbers["own"])
+        both = self.state[: 2 * self.numbers["dof"]].reshape(shape)
+        columns: np.ndarray = both[:, 1:].transpose(0, 2, 1).reshape(2 * own, -1)
+        return columns
+
+
+def _mode_and_side(request: MotionRequest, run: Program) -> tuple[int, int]:
+    model = request.system.model
+    position, speed = float(request.position[0]), float(request.speeds[0])
+    if model.holds_coordinates:
+        return Mode.CONTACT, 0
+    mode, side = side_of_state(len(model.sides), position, speed, run.model.geometry)
+    if mode == Mode.BEYOND:
+        name = model.coordinates[0]
+        raise ParameterError(f"{name} = {position:g} lies beyond the contact at {name} = {float(model.contact):g}", name)
+    return mode, side
+
+
+def _first_state(run: Program, position: np.ndarray, speeds: np.ndarray) -> np.ndarray:
+    """Coordinates and velocities, each followed by the tangent's columns, and the shifts."""
+    columns = run.structure.sizes[-1]
+    start = np.eye(columns, 2 * position.size)  # row j is the initial value of column j
+    u, z = start[:, : position.size].ravel(), start[:, position.size :].ravel()
+    return np.concatenate([position, u, speeds, z, np.zeros(columns)])
+
+
+@dataclass(frozen=True, eq=False)
+class ContactState(KernelState):
+    """What the kernel changes; the `rows` are in the columns of `ContactColumn`, then of `FrictionColumn`."""
+
+    @classmethod
+    def at_start(cls, request: MotionRequest, run: Program) -> ContactState:
+        """The state in which a motion starts. The kernel first decides which contacts at rest at their positions stay closed.
+
+        Raises
+        ------
+        ParameterError
+            The state lies beyond a contact, or moves into a contact that it is at.
+        """
+        start = super().at_start(request, run)
+        names, position, speeds = request.system.model.coordinates, request.position, request.speeds
+        held, rubbed = run.trace.contact_coordinates, run.trace.friction_coordinates
+        contacts = np.zeros((len(held) + len(rubbed), len(ContactColumn)), dtype=np.int64)
+        contacts[:, ContactColumn.COORDINATE] = held + rubbed
+        for row, contact in zip(contacts[: len(held)], request.system.model.contacts, strict=True):
+            place = names.index(contact.coordinate)
+            gap, rate = contact.gap(float(position[place])), contact.sign * float(speeds[place])
+            if gap < 0.0 or (gap == 0.0 and rate < 0.0):
+                where = f"{contact.coordinate} = {position[place]:g}"
+                what = f"lies beyond the contact {contact.name!r}" if gap < 0.0 else f"moves into the contact {contact.name!r}"
+                raise ParameterError(f"{where} {what} at {contact.coordinate} = {float(contact.position):g}", contact.coordinate)
+            row[ContactColumn.CLOSED] = int(gap == 0.0 and rate == 0.0)
+            row[ContactColumn.SKIP] = int(gap == 0.0)
+            if gap == 0.0:
+                start.state[place] = float(contact.position)
+        for row, friction in zip(contacts[len(held) :], request.system.model.frictions, strict=True):
+            rate = float(speeds[names.index(friction.coordinate)]) - float(friction.ground_speed)
+            row[FrictionColumn.SLIDES] = int(np.sign(rate))
+        start.numbers["leave_by"] = 1  # no release is recorded at the start
+        return cls(start.array, start.state, contacts)
+
+    def _kernel(self) -> Callable[..., int]:
+        return load_contacts_kernel()
+
+    @property
+    def side(self) -> int:
+        """1 plus the bits that `modes_of` reads: the closed contacts, and the directions in which frictions slide."""
+        return int(self.numbers["side"])
 
 
 @dataclass(frozen=True)
