@@ -63,7 +63,7 @@ def systems(draw):
     smoothed = getattr(model, "smoothing", None) is not None
     names = [name for name in model.channels if not (smoothed and name.startswith("lower_"))]
     for name in draw(st.lists(st.sampled_from(names), unique=True)):
-        ground = name.startswith("ground_")
+        ground = name.startswith("ground")
         record = records(["displacement", "velocity", "acceleration"] if ground else ["force"])
         single = st.one_of(finite, harmonics, record)
         channels[name] = draw(st.one_of(single, st.builds(lambda a, b: a + b, harmonics, single)))
