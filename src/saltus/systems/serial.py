@@ -118,7 +118,7 @@ def substitute(node: Any, leaf: Callable[[str, float], Any], prefix: str = "") -
     return twin
 
 
-class Classes(UserDict[str, Any]):
+class NamedTypes(UserDict[str, Any]):
     """Classes by their names. One of saltus is imported when it is first asked for: a motion needs one model, not all."""
 
     def __getitem__(self, name: str) -> Any:
@@ -127,12 +127,12 @@ class Classes(UserDict[str, Any]):
         return self.data[name]
 
 
-MODELS = Classes(
+MODELS = NamedTypes(
     dict.fromkeys(("Metainterface", "RockingBlock", "TwoLayer", "WallOscillator", "TwoStops", "ImpactPair", "BeltOscillator"))
     | dict.fromkeys(("TwoCells", "ThreeCells", "FourCells"))
 )
-IMPACTS = Classes(dict.fromkeys(("VelocityReduction", "EnergyRestitution", "InelasticImpact", "NewtonImpact")))
-PULSES = Classes(dict.fromkeys(("HalfSine", "OneSine", "OneCosine", "MavroeidisPapageorgiou", "Ricker", "Ramp", "Chirp")))
+IMPACTS = NamedTypes(dict.fromkeys(("VelocityReduction", "EnergyRestitution", "InelasticImpact", "NewtonImpact")))
+PULSES = NamedTypes(dict.fromkeys(("HalfSine", "OneSine", "OneCosine", "MavroeidisPapageorgiou", "Ricker", "Ramp", "Chirp")))
 
 T = TypeVar("T", type[Model], type[ImpactLaw])
 
