@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from typing import Any
 
-from saltus.plots.conventions import DOUBLE_COLUMN, FAINT, new_figure, panel_label, style
+from saltus.plots.conventions import LOOK, new_figure, panel_label, style
 
 # Okabe and Ito's colours, near ones for one package; and a marker for each code, for greyscale and the colour-blind
 LOOKS = {
@@ -24,7 +24,7 @@ LOOKS = {
 def draw(results: dict[str, Any]) -> bytes:
     """Both panels, as a PNG file."""
     with style():
-        figure = new_figure(width=DOUBLE_COLUMN, height=95.0)
+        figure = new_figure(width=LOOK.double_column, height=95.0)
         left, right = figure.subplots(1, 2)
         for name in dict.fromkeys(row["peer"] for row in results["work"]):
             _work_precision(left, name, [row for row in results["work"] if row["peer"] == name])
@@ -35,7 +35,7 @@ def draw(results: dict[str, Any]) -> bytes:
         right.set(xscale="log", yscale="log", xlabel="tolerance asked for", ylabel="trajectory-periods a second, all cores")
         right.invert_xaxis()
         for ax, label in ((left, "a"), (right, "b")):
-            ax.grid(True, color=FAINT, linewidth=0.4)
+            ax.grid(True, color=LOOK.faint, linewidth=0.4)
             panel_label(ax, label)
         handles, labels = left.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=4)

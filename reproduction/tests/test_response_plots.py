@@ -103,7 +103,7 @@ def test_a_margin_that_jumps_where_impacts_are_born_is_cut_at_the_grazing():
 
 def test_stable_is_solid_blue_unstable_dashed_red_in_the_given_unit(axes):
     response.draw_branches(axes, diagram(folded()), scale=2.0)
-    blue, red = lines(axes, style.STABLE_LINE), lines(axes, style.UNSTABLE_LINE)
+    blue, red = lines(axes, style.LOOK.stable_line), lines(axes, style.LOOK.unstable_line)
     assert (len(blue), len(red)) == (2, 1)
     assert max(line.get_ydata().max() for line in blue + red) == pytest.approx(2.1 / 2.0)
 
@@ -165,7 +165,7 @@ def test_dots_of_simulation_lie_where_they_were_found(axes):
 def test_a_zoom_shows_its_window_of_the_same_data(axes):
     inset = draw_zoom(axes, diagram(folded()), (0.4, 0.4), (1.4, 2.1, 1.0, 2.2))
     assert inset.get_xlim() == (1.4, 2.1)
-    assert lines(inset, style.UNSTABLE_LINE)
+    assert lines(inset, style.LOOK.unstable_line)
 
 
 def test_the_legend_names_only_the_kinds_and_bands_that_are_there():

@@ -20,7 +20,7 @@ def test_a_family_of_curves_gets_lighter_step_by_step():
 
 
 def test_no_two_conventions_share_line_style_and_lightness():
-    lines = (style.STABLE_LINE, style.UNSTABLE_LINE, style.SEPARATRIX_LINE, style.LIMIT_LINE)
+    lines = (style.LOOK.stable_line, style.LOOK.unstable_line, style.LOOK.separatrix_line, style.LOOK.limit_line)
     for i, one in enumerate(lines):
         for two in lines[i + 1 :]:
             assert one["linestyle"] != two["linestyle"] or abs(lightness(one["color"]) - lightness(two["color"])) > 10
@@ -34,4 +34,4 @@ def test_the_conventions_end_with_their_block():
 
 
 def test_a_figure_has_the_width_asked_for():
-    assert style.new_figure(style.SINGLE_COLUMN, 60).get_size_inches()[0] * 25.4 == 90
+    assert style.new_figure(style.LOOK.single_column, 60).get_size_inches()[0] * 25.4 == 90

@@ -7,7 +7,8 @@ import pytest
 from shared_systems import forced
 
 from saltus import WallOscillator, simulate_many
-from saltus.attractors import JUDGEMENT, EarlierJudgement, JudgementSettings, Reason, SettledLater, judge, judgement
+from saltus.attractors import JUDGEMENT, EarlierJudgement, JudgementSettings, SettledLater, judge, judgement
+from saltus.attractors.judgement import Reason
 from saltus.flow import Ending, Recurrence, find_recurrence
 from saltus.systems import Harmonic, Load, System
 

@@ -8,7 +8,8 @@ from shared_systems import forced, walled
 
 import saltus
 from saltus import ParameterError
-from saltus.attractors import Reason, classify, excludes_tori, zero_one_test
+from saltus.attractors import classify, excludes_tori, zero_one_test
+from saltus.attractors.judgement import Reason
 from saltus.attractors.stroboscopic_section import certify
 from saltus.flow import Ending, EventKind, find_recurrence
 from saltus.systems import state_of

@@ -11,7 +11,7 @@ from saltus import ParameterError
 from saltus.branch_tables import branch_tables
 from saltus.plots import figure_of
 from saltus.plots.basins import draw_attractors
-from saltus.plots.conventions import LIMIT, STABLE, UNSTABLE
+from saltus.plots.conventions import LOOK
 from saltus.plots.plane import draw_plane
 from saltus.plots.response import draw_diagram
 from saltus.studies import phase_portrait
@@ -41,7 +41,7 @@ def marks(figure, face):
 def test_stable_equilibria_are_filled_and_unstable_ones_open():
     data, figure = portrait(), figure_of(draw_plane(portrait()))
     stable = data["stable"].values
-    np.testing.assert_array_equal(marks(figure, STABLE), data["equilibrium"].values[stable])
+    np.testing.assert_array_equal(marks(figure, LOOK.stable), data["equilibrium"].values[stable])
     np.testing.assert_array_equal(marks(figure, "white"), data["equilibrium"].values[~stable])
     assert {text.get_text() for text in figure.legends[0].get_texts()} == {
         "motion",
@@ -54,7 +54,7 @@ def test_stable_equilibria_are_filled_and_unstable_ones_open():
 def test_motions_that_were_spread_stay_apart():
     """No two of them run on beside one another: few of their points are as near to another motion as lines are wide."""
     figure = figure_of(draw_plane(portrait()))
-    lines = [np.stack(line.get_data(), axis=1) / [5.0, 3.0] for line in drawn(figure, STABLE)]
+    lines = [np.stack(line.get_data(), axis=1) / [5.0, 3.0] for line in drawn(figure, LOOK.stable)]
     assert 8 < len(lines) <= portrait().sizes["motion"]
     near = 0
     for i, line in enumerate(lines):
@@ -67,7 +67,7 @@ def test_motions_that_were_spread_stay_apart():
 
 def test_given_motions_are_drawn_whole():
     data = portrait(starts=((0.3, 0.0), (0.301, 0.0)))
-    lines = drawn(figure_of(draw_plane(data)), STABLE)
+    lines = drawn(figure_of(draw_plane(data)), LOOK.stable)
     assert len(lines) == 2
     for line, theta in zip(lines, data["theta"].values, strict=True):
         np.testing.assert_array_equal(line.get_xdata(), theta)
@@ -77,7 +77,7 @@ def test_a_closed_motion_is_drawn_closed():
     system = System(model=Metainterface(beta0=np.deg2rad(80)), load=Load(vertical=-1.5))
     figure = figure_of(draw_plane(phase_portrait(system, window=((-2.5, 2.5), (-1.5, 1.5)), duration=30.0)))
     closed = 0
-    for line in drawn(figure, STABLE):
+    for line in drawn(figure, LOOK.stable):
         points = np.stack(line.get_data(), axis=1) / [5.0, 3.0]
         points = points[np.isfinite(points).all(axis=1)]
         later = points[len(points) // 2 :]
@@ -136,12 +136,12 @@ def diagram(amplitudes=(0.5, 1.0), limits=(1.74, 3.48), parameters=(0.5, 1.0)):
 @pytest.mark.parametrize(("limits", "top", "number"), [((1.74, 3.48), 1.0, 0), ((0.74, 1.48), 1.0, 1), ((0.74, 1.48), 2.0, 2)])
 def test_the_limits_of_the_mechanism_are_drawn_where_they_are_reached(limits, top, number):
     figure = figure_of(draw_diagram(diagram((0.5, top), limits)))
-    places = sorted({float(line.get_ydata()[0]) for line in drawn(figure, LIMIT)})
+    places = sorted({float(line.get_ydata()[0]) for line in drawn(figure, LOOK.limit)})
     np.testing.assert_allclose(places, limits[:number])
 
 
 def test_no_limit_is_drawn_where_there_is_none_or_it_varies():
-    assert not drawn(figure_of(draw_diagram(diagram((0.5, 3.0), ()))), LIMIT)
+    assert not drawn(figure_of(draw_diagram(diagram((0.5, 3.0), ()))), LOOK.limit)
 
 
 def test_a_diagram_of_nothing_but_rest_is_drawn():
@@ -201,7 +201,7 @@ def test_starts_have_the_colour_of_the_attractor_that_they_lead_to():
     cycle = next(line for line in lines if list(line.get_xdata()) == [0.5, -0.5])
     starts = next(line for line in figure_lines if list(line.get_xdata()) == [0.2, 0.3])
     assert same_color(cycle.get_markerfacecolor(), starts.get_markerfacecolor())
-    assert not same_color(starts.get_markerfacecolor(), UNSTABLE)
+    assert not same_color(starts.get_markerfacecolor(), LOOK.unstable)
 
 
 def test_where_the_amplitude_is_flat_the_lowest_values_can_be_drawn():

@@ -9,7 +9,8 @@ import pytest
 
 import saltus
 from saltus import branch_of
-from saltus.attractors import Reason, judge
+from saltus.attractors import judge
+from saltus.attractors.judgement import Reason
 from saltus.flow import Ending, Stop
 from saltus.orbits import orbits_near_returns, search_orbits, solved_near
 from saltus.plots.chart import draw_stability_chart

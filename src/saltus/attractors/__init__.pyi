@@ -1,7 +1,6 @@
 from .along_parameter import attractors_along as attractors_along
 from .attractor import Attractor as Attractor
 from .attractor import Attractors as Attractors
-from .attractor import Target as Target
 from .attractor import share_interval as share_interval
 from .attractor_search import find_attractors as find_attractors
 from .basins.fractal import BasinEntropy as BasinEntropy
@@ -17,7 +16,6 @@ from .judgement import JUDGEMENT as JUDGEMENT
 from .judgement import EarlierJudgement as EarlierJudgement
 from .judgement import Judged as Judged
 from .judgement import JudgementSettings as JudgementSettings
-from .judgement import Reason as Reason
 from .judgement import SettledLater as SettledLater
 from .judgement import judge as judge
 from .lyapunov.many_exponents import lyapunov_many as lyapunov_many

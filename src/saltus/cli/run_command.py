@@ -109,10 +109,9 @@ def computed(study: Study, ask: Ask, output: Path, progress: Progress, scheduler
 def written(ask: Ask, data: Any, output: Path, plot: bool) -> list[Path]:
     """The files of an answer: its data, if no store keeps them, and with `plot` the picture."""
     from saltus.files import write_dataset
-    from saltus.plots import data_is_tree
 
     store = output / f"{ask.kind}.zarr"
-    if ask.kind == "stability_chart" and not data_is_tree(data):
+    if ask.kind == "stability_chart" and not hasattr(data, "children"):
         files = [store]
     else:
         data.attrs["kind"] = ask.kind

@@ -3,7 +3,6 @@ from .continuation_loop import Continuation as Continuation
 from .continuation_loop import Watch as Watch
 from .continuation_loop import both_ways as both_ways
 from .course import Course as Course
-from .curve import Curve as Curve
 from .curve import Evidence as Evidence
 from .curve import Point as Point
 from .curve import Zero as Zero
@@ -16,12 +15,10 @@ from .end import MissedReason as MissedReason
 from .events import Cut as Cut
 from .events import Events as Events
 from .predictor import STEPS as STEPS
-from .predictor import StepSettings as StepSettings
 from .predictor import between as between
 from .pseudo_arclength import NEWTON as NEWTON
 from .pseudo_arclength import Corrected as Corrected
 from .pseudo_arclength import EquationCurve as EquationCurve
-from .pseudo_arclength import Evaluation as Evaluation
 from .pseudo_arclength import newton as newton
 from .test_functions import TestFunction as TestFunction
 from .test_functions import located as located

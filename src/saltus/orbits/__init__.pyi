@@ -16,7 +16,6 @@ from .branches.special_point import SpecialPoint as SpecialPoint
 from .branches.symmetry import is_symmetric as is_symmetric
 from .branches.symmetry import keeps_symmetry as keeps_symmetry
 from .equations.kinds import equations_of as equations_of
-from .equations.one_contact import OneContactEquations as OneContactEquations
 from .finding.from_motion import find_orbit as find_orbit
 from .finding.from_motion import orbit_from as orbit_from
 from .finding.from_motion import orbits_near_returns as orbits_near_returns
@@ -24,11 +23,9 @@ from .finding.from_motion import solved_near as solved_near
 from .finding.search import Search as Search
 from .finding.search import search_orbits as search_orbits
 from .free_orbits import FreeOrbit as FreeOrbit
-from .free_orbits import NoFreeOrbit as NoFreeOrbit
 from .free_orbits import backbone as backbone
 from .free_orbits import free_orbit as free_orbit
 from .orbit import PeriodicOrbit as PeriodicOrbit
-from .orbit import solve as solve
 from .orbits_as_json import as_json as as_json
 from .orbits_as_json import from_json as from_json
 from .signature import Signature as Signature

@@ -11,7 +11,7 @@ from saltus.notebook import show_below_cell
 from saltus.plots.basins import draw_attractors, draw_basins, draw_uncertainty, draw_wada
 from saltus.plots.chaos import draw_chaotic_bands, draw_exponents, draw_exponents_along, draw_verdict
 from saltus.plots.chart import draw_stability_chart
-from saltus.plots.conventions import SINGLE_COLUMN, axes_or_new, figure_of, style
+from saltus.plots.conventions import LOOK, axes_or_new, figure_of, style
 from saltus.plots.curves import draw_attractors_along, draw_backbone, draw_branch, draw_cascade, draw_search, draw_special_curve
 from saltus.plots.motion import draw_ensemble, draw_motion, draw_sensitivities, draw_sweep
 from saltus.plots.plane import draw_manifold, draw_plane, draw_separatrix
@@ -71,7 +71,7 @@ def plot(result: Any, **options: Any) -> Any:
     if isinstance(result, (tuple, list)) and result:
         given = options.pop("ax", None)
         with style() if given is None else nullcontext():
-            ax = axes_or_new(given, options.pop("width", SINGLE_COLUMN), 0.8 * SINGLE_COLUMN)
+            ax = axes_or_new(given, options.pop("width", LOOK.single_column), 0.8 * LOOK.single_column)
             for each in result:
                 plot(each, ax=ax, **options)
         if given is None:

@@ -13,11 +13,7 @@ from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import FormatStrFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from saltus.plots.conventions import (
-    INK,
-    LIMIT_LINE,
-    SINGLE_COLUMN,
-    STABLE,
-    STABLE_LINE,
+    LOOK,
     axes_or_new,
     cell_edges,
     drawing,
@@ -33,14 +29,14 @@ START_MARK: dict[str, Any] = {
     "marker": "o",
     "markersize": 2.6,
     "markeredgewidth": 0.3,
-    "markeredgecolor": INK,
+    "markeredgecolor": LOOK.ink,
     "zorder": 3,
 }
 HALO = [Stroke(linewidth=2.2, foreground="white"), Normal()]  # so that an attractor stands out among the starts
 
 
 @drawing
-def draw_attractors(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * SINGLE_COLUMN) -> Axes:
+def draw_attractors(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * LOOK.single_column) -> Axes:
     """Draw the dataset of `find_attractors`: a dot for each start, a mark for each state at phase 0; returns `ax`."""
     x, y = (str(name) for name in dataset.attrs["plane"])
     colours = attractor_colours([int(n) for n in dataset["attractor"].values])
@@ -66,7 +62,13 @@ def _share(dataset: Any, i: int) -> str:
 UNDECIDED_COLOUR = "#ffffff"
 AT_REST = "#dddddd"  # lighter than every colour of a moving attractor
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "p")
-MARK: dict[str, Any] = {"linestyle": "none", "markersize": 4.5, "markerfacecolor": "white", "markeredgecolor": INK, "zorder": 6}
+MARK: dict[str, Any] = {
+    "linestyle": "none",
+    "markersize": 4.5,
+    "markerfacecolor": "white",
+    "markeredgecolor": LOOK.ink,
+    "zorder": 6,
+}
 POINT: dict[str, Any] = MARK | {"marker": "o", "markersize": 1.8, "markeredgewidth": 0.4}  # of a set that does not repeat
 MOST_NAMED = 8  # attractors in the legend
 
@@ -116,15 +118,19 @@ def _kind(dataset: Any, i: int) -> str:
 
 
 def _handle(marker: str, colour: Any, text: str) -> Line2D:
-    return Line2D([], [], linestyle="none", marker=marker, markersize=6, markerfacecolor=colour, markeredgecolor=INK, label=text)
+    return Line2D(
+        [], [], linestyle="none", marker=marker, markersize=6, markerfacecolor=colour, markeredgecolor=LOOK.ink, label=text
+    )
 
 
-BOUNDARY: dict[str, Any] = {"color": INK, "linewidth": 0.7, "zorder": 4}
+BOUNDARY: dict[str, Any] = {"color": LOOK.ink, "linewidth": 0.7, "zorder": 4}
 LINE_HALO = [Stroke(linewidth=1.7, foreground="white", alpha=0.8), Normal()]  # so that the line shows on dark colours, too
 
 
 @drawing
-def draw_basins(dataset: Any, manifolds: Iterable[Any] = (), *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
+def draw_basins(
+    dataset: Any, manifolds: Iterable[Any] = (), *, ax: Axes | None = None, width: float = LOOK.single_column
+) -> Axes:
     """Draw a dataset of basins, such as `saltus.attractors.basins_of_attraction` gives.
 
     Rest is light grey, the other attractors go from dark to light by their labels, undecided cells are white; each attractor
@@ -181,17 +187,17 @@ def _percent(share: float) -> str:
 
 
 @drawing
-def draw_uncertainty(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
+def draw_uncertainty(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column) -> Axes:
     """Draw the share of uncertain states over the distance, on logarithmic axes, with the power law that was fitted."""
     ax = axes_or_new(ax, width, 0.75 * width)
     distance, share = dataset["distance"].values, dataset["share"].values
     alpha, error = float(dataset.attrs["alpha"]), float(dataset.attrs["error"])
     known = share > 0.0
-    ax.loglog(distance[known], share[known], ls="none", marker="o", ms=4.0, mfc="white", mec=INK, label="grid")
+    ax.loglog(distance[known], share[known], ls="none", marker="o", ms=4.0, mfc="white", mec=LOOK.ink, label="grid")
     if np.isfinite(alpha) and known.any():
         middle = np.exp(np.mean(np.log(share[known]) - alpha * np.log(distance[known])))
         label = rf"$\varepsilon^\alpha$, $\alpha={alpha:.3f}\pm{error:.3f}$"
-        ax.loglog(distance, middle * distance**alpha, label=label, **STABLE_LINE)
+        ax.loglog(distance, middle * distance**alpha, label=label, **LOOK.stable_line)
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.set_major_formatter(FormatStrFormatter("%g"))
@@ -203,12 +209,14 @@ def draw_uncertainty(dataset: Any, *, ax: Axes | None = None, width: float = SIN
 
 
 @drawing
-def draw_wada(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
+def draw_wada(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column) -> Axes:
     """Draw the share of the boundary cells that have all basins within a radius, and the shares from which a verdict follows."""
     ax = axes_or_new(ax, width, 0.75 * width)
-    ax.plot(dataset["radius"].values, dataset["share"].values, color=STABLE, marker="o", ms=4.0, lw=0.9, label="boundary cells")
+    ax.plot(
+        dataset["radius"].values, dataset["share"].values, color=LOOK.stable, marker="o", ms=4.0, lw=0.9, label="boundary cells"
+    )
     for name, label in (("agrees", "agrees with Wada above"), ("fails", "does not below")):
-        style = {**LIMIT_LINE, "linestyle": "-" if name == "agrees" else (0, (1, 1.2))}
+        style = {**LOOK.limit_line, "linestyle": "-" if name == "agrees" else (0, (1, 1.2))}
         ax.axhline(float(dataset.attrs[name]), label=label, **style)
     ax.set_ylim(-0.03, 1.03)
     ax.set_xlabel("radius (cells)")

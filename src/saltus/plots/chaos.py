@@ -12,13 +12,7 @@ from matplotlib.patches import Patch
 
 from saltus.errors import ParameterError
 from saltus.plots.conventions import (
-    DOUBLE_COLUMN,
-    FAINT,
-    INK,
-    SINGLE_COLUMN,
-    STABLE,
-    STABLE_LINE,
-    UNSTABLE_LINE,
+    LOOK,
     axes_or_new,
     cell_edges,
     drawing,
@@ -35,13 +29,13 @@ from saltus.plots.conventions import (
 from saltus.plots.response import BAND_NAMES, BANDS, draw_bands, draw_stroboscopic_states
 
 NAME = r"exponent $\lambda$ (per unit of $\tau$)"
-ZERO: dict[str, Any] = {"color": INK, "linewidth": 0.5, "zorder": 1}
+ZERO: dict[str, Any] = {"color": LOOK.ink, "linewidth": 0.5, "zorder": 1}
 UNRESOLVED: dict[str, Any] = {"color": "#e6e6e6", "linewidth": 0.0, "zorder": 0}
 HALVES = (("at_half", "<", "first half of the run"), ("later_half", ">", "second half of the run"))
 
 
 @drawing
-def draw_exponents(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
+def draw_exponents(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column) -> Axes:
     """Draw the exponents of one motion with 95 % intervals, those of both halves of the run, and that of two trajectories.
 
     The grey range, 2 ln(t) / t for the time t, cannot be distinguished from 0.
@@ -55,13 +49,23 @@ def draw_exponents(dataset: Any, *, ax: Axes | None = None, width: float = SINGL
     if known.any():
         ax.axhspan(-resolution, resolution, label="not distinct from 0", **UNRESOLVED)
     ax.errorbar(
-        index[known], values[known], errors[known], color=STABLE, fmt="o", ms=4.0, capsize=3.0, lw=0.9, label="exponent, 95 %"
+        index[known],
+        values[known],
+        errors[known],
+        color=LOOK.stable,
+        fmt="o",
+        ms=4.0,
+        capsize=3.0,
+        lw=0.9,
+        label="exponent, 95 %",
     )
     for (name, marker, label), shift in zip(HALVES, (-0.12, 0.12), strict=True):
-        ax.plot(index + shift, dataset[name].values, marker=marker, ms=3.5, mfc="white", mec=INK, mew=0.6, ls="none", label=label)
+        ax.plot(
+            index + shift, dataset[name].values, marker=marker, ms=3.5, mfc="white", mec=LOOK.ink, mew=0.6, ls="none", label=label
+        )
     stroboscopic = float(dataset["stroboscopic"])
     if np.isfinite(stroboscopic):
-        ax.plot(1.24, stroboscopic, marker="x", ms=4.5, mec=INK, ls="none", label="two trajectories")
+        ax.plot(1.24, stroboscopic, marker="x", ms=4.5, mec=LOOK.ink, ls="none", label="two trajectories")
     for place in index[~known]:
         text = r"$-\infty$" if values[place - 1] == -np.inf else "undefined"
         ax.annotate(text, (place, 0.0), (0, -9), textcoords="offset points", ha="center", va="top")
@@ -75,7 +79,7 @@ def draw_exponents(dataset: Any, *, ax: Axes | None = None, width: float = SINGL
 
 
 @drawing
-def draw_exponents_along(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * SINGLE_COLUMN) -> Axes:
+def draw_exponents_along(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * LOOK.single_column) -> Axes:
     """Draw the dataset of `lyapunov_many`: over one dimension all exponents with their errors, over two the largest one.
 
     Where a motion rests its exponents are -inf or do not exist, and lines are interrupted.
@@ -96,7 +100,7 @@ def draw_exponents_along(dataset: Any, *, ax: Axes | None = None, width: float =
     values = np.where(np.isfinite(values), values, np.nan)
     ax.axhline(0.0, **ZERO)
     marker = "o" if len(x) == 1 else None
-    for i, line in enumerate((STABLE_LINE, UNSTABLE_LINE)):
+    for i, line in enumerate((LOOK.stable_line, LOOK.unstable_line)):
         ax.fill_between(x, values[:, i] - errors[:, i], values[:, i] + errors[:, i], color=line["color"], alpha=0.2, lw=0.0)
         ax.plot(x, values[:, i], label=rf"$\lambda_{i + 1}$", marker=marker, ms=4.0, **line)
     ax.set_xlabel(label)
@@ -112,10 +116,10 @@ def _draw_map(ax: Axes, dataset: Any, dims: list[str]) -> Axes:
     mesh = ax.pcolormesh(
         cell_edges(x), cell_edges(y), np.where(np.isfinite(largest), largest, np.nan), cmap="viridis_r", rasterized=True
     )
-    ax.set_facecolor(FAINT)
+    ax.set_facecolor(LOOK.faint)
     positive = dataset["positive"].transpose(*dims).values.T.astype(float)
     if min(positive.shape) > 1 and 0.0 < positive.mean() < 1.0:
-        ax.contour(x, y, positive, levels=[0.5], colors=[INK], linewidths=0.9)
+        ax.contour(x, y, positive, levels=[0.5], colors=[LOOK.ink], linewidths=0.9)
     ax.set_xlabel(first)
     ax.set_ylabel(second)
     ax.figure.colorbar(mesh, ax=ax, label=r"largest exponent $\lambda_1$ (per unit of $\tau$)")
@@ -126,16 +130,23 @@ LINE_LENGTH = 62  # characters of the sentence above a picture of one column
 
 
 @drawing
-def draw_verdict(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
+def draw_verdict(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column) -> Axes:
     """Draw the states at phase 0 on which a motion ends, its orbit if there is one, and the verdict's sentence; returns `ax`."""
     own, ax = ax is None, axes_or_new(ax, width, 0.85 * width)
     plane = plane_of(dataset)
     states = [dataset[f"section_{name}"].values for name in plane]
     many = len(states[0]) > 64
     if f"curve_{plane[0]}" in dataset:
-        ax.plot(*(dataset[f"curve_{name}"].values for name in plane), label="its orbit", **STABLE_LINE)
+        ax.plot(*(dataset[f"curve_{name}"].values for name in plane), label="its orbit", **LOOK.stable_line)
     ax.plot(
-        *states, ls="none", marker="o", color=INK, ms=1.2 if many else 4.5, mew=0.0, label="states at phase 0", rasterized=many
+        *states,
+        ls="none",
+        marker="o",
+        color=LOOK.ink,
+        ms=1.2 if many else 4.5,
+        mew=0.0,
+        label="states at phase 0",
+        rasterized=many,
     )
     ax.set_xlabel(state_label(dataset, f"section_{plane[0]}", plane))
     ax.set_ylabel(state_label(dataset, f"section_{plane[1]}", plane))
@@ -157,7 +168,7 @@ def draw_chaotic_bands(tree: Any, *, ax: Axes | None = None, figure: Figure | No
     """
     if ax is not None:
         return _draw_states(ax, tree)
-    figure = new_figure(DOUBLE_COLUMN, 120.0) if figure is None else figure
+    figure = new_figure(LOOK.double_column, 120.0) if figure is None else figure
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     _draw_states(above, tree).set_xlabel("")
     handles: list[Any] = [Patch(color=BANDS["CH"], label=BAND_NAMES["CH"])] if tree["bands"].sizes["band"] else []
@@ -187,7 +198,14 @@ def _draw_deciding_exponents(below: Axes, tree: Any) -> list[Any]:
         here = (verdict == number) & np.isfinite(table["exponent"].values)
         if here.any():
             columns = (table[column].values[here] for column in ("value", "exponent", "error"))
-            marks: dict[str, Any] = {"color": INK, "fmt": VERDICTS[meaning], "ms": 3.0, "mfc": "white", "lw": 0.6, "mew": 0.6}
+            marks: dict[str, Any] = {
+                "color": LOOK.ink,
+                "fmt": VERDICTS[meaning],
+                "ms": 3.0,
+                "mfc": "white",
+                "lw": 0.6,
+                "mew": 0.6,
+            }
             handles.append(below.errorbar(*columns, capsize=1.5, label=f"exponent, 95 %: {meaning.replace('_', '-')}", **marks))
     if not np.isfinite(table["exponent"].values).any():
         below.text(0.5, 0.5, "all motions settle", transform=below.transAxes, ha="center", va="bottom")

@@ -15,10 +15,7 @@ from matplotlib.patheffects import Normal, Stroke
 
 from saltus.plots.branch_cuts import border_curves
 from saltus.plots.conventions import (
-    INK,
-    LIMIT,
-    SINGLE_COLUMN,
-    UNSTABLE,
+    LOOK,
     axes_or_new,
     cell_edges,
     drawing,
@@ -37,31 +34,31 @@ LEVELS = np.array([0.0, 0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.
 # colour, and the words of the legend. The hatches differ, so that cells can be told apart without colours.
 FILLINGS: dict[str, tuple[str | None, str, str, str]] = {
     "several_motions": (None, "......", "white", "several motions"),
-    "motions_and_chaos": (None, "//////", INK, "chaos beside motions"),
+    "motions_and_chaos": (None, "//////", LOOK.ink, "chaos beside motions"),
     "chaos": ("#8c8c8c", "//////", "white", "chaos alone"),
-    "long": ("#dedede", "------", INK, "long period, or slow"),
-    "quasi_periodic": ("#dedede", "||||||", INK, "quasi-periodic"),
-    "undecided": ("#dedede", "xxxxxx", INK, "undecided"),
+    "long": ("#dedede", "------", LOOK.ink, "long period, or slow"),
+    "quasi_periodic": ("#dedede", "||||||", LOOK.ink, "quasi-periodic"),
+    "undecided": ("#dedede", "xxxxxx", LOOK.ink, "undecided"),
 }
 BORDERS: dict[str, Any] = {"LP": "-", "PD": (0, (5, 1.5)), "BPC": (0, (5, 1.2, 1, 1.2)), "GR": (0, (1, 1.1))}
 BORDER_NAMES = {"LP": "fold", "PD": "period doubling", "BPC": "symmetry breaking", "GR": "grazing"}
-BESIDE_REST: dict[str, Any] = {"color": INK, "lw": 1.7}  # the border of the region with rest alone
+BESIDE_REST: dict[str, Any] = {"color": LOOK.ink, "lw": 1.7}  # the border of the region with rest alone
 INSIDE: dict[str, Any] = {"color": "#333333", "lw": 0.4}  # where one motion among others begins or ends
 WHITE_GROUND = [Stroke(linewidth=2.9, foreground="white"), Normal()]  # so that a line is seen on every colour
 THIN_GROUND = [Stroke(linewidth=1.0, foreground="white", alpha=0.6), Normal()]
-STATIC_LINE: dict[str, Any] = {"color": UNSTABLE, "lw": 1.4}
-PRINTED_LINE: dict[str, Any] = {"color": UNSTABLE, "lw": 1.0, "ls": (0, (1, 1.2))}  # the paper's border where it is wrong
-LINE_LIMIT: dict[str, Any] = {"color": LIMIT, "lw": 0.9}
-DOT: dict[str, Any] = {"linestyle": "none", "marker": ".", "color": INK, "markersize": 2.0, "markeredgewidth": 0.0}
-CROSS: dict[str, Any] = {"linestyle": "none", "marker": "x", "color": UNSTABLE}
-CLOSED_FORM: dict[str, Any] = {"linestyle": "none", "marker": "o", "mfc": "white", "mec": INK}
+STATIC_LINE: dict[str, Any] = {"color": LOOK.unstable, "lw": 1.4}
+PRINTED_LINE: dict[str, Any] = {"color": LOOK.unstable, "lw": 1.0, "ls": (0, (1, 1.2))}  # the paper's border where it is wrong
+LINE_LIMIT: dict[str, Any] = {"color": LOOK.limit, "lw": 0.9}
+DOT: dict[str, Any] = {"linestyle": "none", "marker": ".", "color": LOOK.ink, "markersize": 2.0, "markeredgewidth": 0.0}
+CROSS: dict[str, Any] = {"linestyle": "none", "marker": "x", "color": LOOK.unstable}
+CLOSED_FORM: dict[str, Any] = {"linestyle": "none", "marker": "o", "mfc": "white", "mec": LOOK.ink}
 
 
 @drawing
 def draw_stability_chart(data: Any, *, ax: Axes | None = None) -> Axes:
     """Draw the Dataset of a chart, or the DataTree of a chart and its borders, with a colour bar and a legend; returns `ax`."""
-    chart = data["chart"].to_dataset() if data_is_tree(data) else data
-    own, ax = ax is None, axes_or_new(ax, 1.2 * SINGLE_COLUMN, 98.0)
+    chart = data["chart"].to_dataset() if getattr(data, "children", None) else data
+    own, ax = ax is None, axes_or_new(ax, 1.2 * LOOK.single_column, 98.0)
     cells = draw_chart(ax, chart)
     path = list(chart.attrs.get("path", ("horizontal", "vertical")))
     ax.set_xlabel(parameter_name(path[0]))
@@ -78,11 +75,6 @@ def draw_stability_chart(data: Any, *, ax: Axes | None = None) -> Axes:
     if handles:
         legend_of(ax, own, handles, ncols=2, columnspacing=1.4, handletextpad=0.6)
     return ax
-
-
-def data_is_tree(data: Any) -> bool:
-    """Whether a result is a tree of datasets."""
-    return bool(getattr(data, "children", None))
 
 
 def draw_lines(ax: Any, tree: Any) -> int:
@@ -193,7 +185,7 @@ def _outline(ax: Any, x: np.ndarray, y: np.ndarray, where: np.ndarray) -> None:
     across, down = np.diff(padded, axis=1)[1:-1], np.diff(padded, axis=0)[:, 1:-1]
     lines = [((x[j], y[i]), (x[j], y[i + 1])) for i, j in np.argwhere(across)]
     lines += [((x[j], y[i]), (x[j + 1], y[i])) for i, j in np.argwhere(down)]
-    ax.add_collection(LineCollection(lines, colors=LIMIT, linewidths=0.9, zorder=4))
+    ax.add_collection(LineCollection(lines, colors=LOOK.limit, linewidths=0.9, zorder=4))
 
 
 def draw_static(ax: Any, static: Any) -> None:
@@ -233,7 +225,7 @@ def _fillings(charts: Sequence[Any]) -> list[Patch]:
 def _cell_handles(chart: Any) -> list[Any]:
     """Legend entries of the marks that occur in the cells of a chart."""
     handles: list[tuple[Any, Any]] = [
-        (_resting(chart), Patch(facecolor="white", edgecolor=INK, linewidth=0.4, label="rest alone")),
+        (_resting(chart), Patch(facecolor="white", edgecolor=LOOK.ink, linewidth=0.4, label="rest alone")),
         *((with_outcome(chart, name), _filling(name)) for name in FILLINGS),
     ]
     if "beyond_line" in chart:
@@ -251,7 +243,9 @@ def _line_handles(curves: Iterable[Any], static: bool, rest: bool) -> list[Any]:
         Line2D([], [], **STATIC_LINE, label="quasi-static border"),
         Line2D([], [], **PRINTED_LINE, label=r"$\widehat{\mathcal{H}}_{cr}^{QS}$ where it is not"),
     ]
-    exact = [Line2D([], [], color=INK, lw=0.7, ls=BORDERS[kind], label=BORDER_NAMES[kind]) for kind in BORDERS if kind in kinds]
+    exact = [
+        Line2D([], [], color=LOOK.ink, lw=0.7, ls=BORDERS[kind], label=BORDER_NAMES[kind]) for kind in BORDERS if kind in kinds
+    ]
     heavy = [Line2D([], [], **BESIDE_REST, label="beside rest alone")] if exact and rest else []
     return (handles if static else []) + heavy + exact
 

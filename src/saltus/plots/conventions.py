@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
 from functools import wraps
 from inspect import signature
 from typing import Any, ParamSpec, TypeVar
@@ -26,22 +27,45 @@ from saltus.public_functions import answered, bound_arguments
 P = ParamSpec("P")
 R = TypeVar("R")
 
-STABLE = "#0b4fa0"
-UNSTABLE = "#d1342f"
-PALE_STABLE = "#8db3de"
-PALE_UNSTABLE = "#efaaa5"
-SEPARATRIX = "#7a7a7a"
-LIMIT = "#009060"
-FAINT = "#bdbdbd"  # grids, axes of symmetry, the discontinuity plane
-INK = "#1a1a1a"
 
-STABLE_LINE: dict[str, Any] = {"color": STABLE, "linestyle": "-", "linewidth": 1.0}
-UNSTABLE_LINE: dict[str, Any] = {"color": UNSTABLE, "linestyle": (0, (4, 2)), "linewidth": 1.0}
-SEPARATRIX_LINE: dict[str, Any] = {"color": SEPARATRIX, "linestyle": (0, (5, 2)), "linewidth": 1.1}
-LIMIT_LINE: dict[str, Any] = {"color": LIMIT, "linestyle": (0, (6, 2, 1, 2)), "linewidth": 1.0}
+@dataclass(frozen=True)
+class Look:
+    """Colours, lines and widths of all pictures."""
 
-SINGLE_COLUMN = 90.0  # mm
-DOUBLE_COLUMN = 190.0  # mm
+    stable: str = "#0b4fa0"
+    unstable: str = "#d1342f"
+    pale_stable: str = "#8db3de"
+    pale_unstable: str = "#efaaa5"
+    separatrix: str = "#7a7a7a"
+    limit: str = "#009060"
+    faint: str = "#bdbdbd"  # grids, axes of symmetry, the discontinuity plane
+    ink: str = "#1a1a1a"
+    single_column: float = 90.0  # mm
+    double_column: float = 190.0  # mm
+    dashes: tuple[Any, ...] = ("-", (0, (6, 1.5)), (0, (3, 1.2)), (0, (5, 1.2, 1, 1.2)), (0, (1, 1.2)))
+
+    @property
+    def stable_line(self) -> dict[str, Any]:
+        """Solid and blue."""
+        return {"color": self.stable, "linestyle": "-", "linewidth": 1.0}
+
+    @property
+    def unstable_line(self) -> dict[str, Any]:
+        """Dashed and red."""
+        return {"color": self.unstable, "linestyle": (0, (4, 2)), "linewidth": 1.0}
+
+    @property
+    def separatrix_line(self) -> dict[str, Any]:
+        """Dashed and grey."""
+        return {"color": self.separatrix, "linestyle": (0, (5, 2)), "linewidth": 1.1}
+
+    @property
+    def limit_line(self) -> dict[str, Any]:
+        """Dash-dotted and green."""
+        return {"color": self.limit, "linestyle": (0, (6, 2, 1, 2)), "linewidth": 1.0}
+
+
+LOOK = Look()
 RESOLUTION = 300  # dots per inch of the PNG
 
 RC: Any = {
@@ -58,9 +82,9 @@ RC: Any = {
     "legend.framealpha": 0.85,
     "legend.handlelength": 2.4,
     "axes.linewidth": 0.6,
-    "axes.edgecolor": INK,
-    "axes.labelcolor": INK,
-    "text.color": INK,
+    "axes.edgecolor": LOOK.ink,
+    "axes.labelcolor": LOOK.ink,
+    "text.color": LOOK.ink,
     "xtick.direction": "in",
     "ytick.direction": "in",
     "xtick.top": True,
@@ -103,7 +127,7 @@ def styled(draw: Callable[P, R]) -> Callable[P, R]:
     return inside
 
 
-def new_figure(width: float = SINGLE_COLUMN, height: float = 65.0, **options: Any) -> Figure:
+def new_figure(width: float = LOOK.single_column, height: float = 65.0, **options: Any) -> Figure:
     """An empty Figure of the given size in millimetres, laid out so that nothing is clipped."""
     options.setdefault("layout", "constrained")
     return Figure(figsize=(width / 25.4, height / 25.4), **options)
@@ -148,9 +172,6 @@ def marks_of(ax: Axes) -> dict[str, Any]:
     """The handles and labels of a legend of axes, each label once."""
     handles, labels = ax.get_legend_handles_labels()
     return dict(zip(labels, handles, strict=True))
-
-
-DASHES: tuple[Any, ...] = ("-", (0, (6, 1.5)), (0, (3, 1.2)), (0, (5, 1.2, 1, 1.2)), (0, (1, 1.2)))
 
 
 def panel_label(ax: Any, label: str) -> None:

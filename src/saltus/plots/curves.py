@@ -12,13 +12,7 @@ from matplotlib.ticker import NullLocator
 from saltus.plots.basins import attractor_colours
 from saltus.plots.branch_cuts import smooth_lines
 from saltus.plots.conventions import (
-    DOUBLE_COLUMN,
-    INK,
-    LIMIT_LINE,
-    SINGLE_COLUMN,
-    STABLE,
-    STABLE_LINE,
-    UNSTABLE,
+    LOOK,
     axes_or_new,
     drawing,
     marks_of,
@@ -37,7 +31,7 @@ REST_NAMES = {"RL": "lost release (RL)", "CH": "end of a rest (CH)"}
 
 
 @drawing
-def draw_branch(dataset: Any, quantity: str = "amplitude", *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
+def draw_branch(dataset: Any, quantity: str = "amplitude", *, ax: Axes | None = None, width: float = LOOK.single_column) -> Axes:
     """Draw the dataset of a branch: stable motions solid, unstable ones dashed, and its special points; returns `ax`."""
     own, ax = ax is None, axes_or_new(ax, width, 0.75 * width)
     for line in smooth_lines(dataset, quantity):
@@ -46,7 +40,9 @@ def draw_branch(dataset: Any, quantity: str = "amplitude", *, ax: Axes | None = 
     for kind, mark in (MARKS | RESTS).items():
         if (kinds == kind).any():
             places = (dataset[f"special_{name}"].values[kinds == kind] for name in ("parameter", quantity))
-            ax.plot(*places, ls="none", mfc="white", mec=INK, mew=0.5, zorder=5, label=(MARK_NAMES | REST_NAMES)[kind], **mark)
+            ax.plot(
+                *places, ls="none", mfc="white", mec=LOOK.ink, mew=0.5, zorder=5, label=(MARK_NAMES | REST_NAMES)[kind], **mark
+            )
     handles, labels, handlers = line_handles([dataset])
     named = dict(zip(labels, handles, strict=True)) | marks_of(ax)
     legend = {"handles": [*named.values()], "labels": [*named], "handler_map": handlers, "handlelength": 3.6}
@@ -60,11 +56,13 @@ def draw_branch(dataset: Any, quantity: str = "amplitude", *, ax: Axes | None = 
 
 
 @drawing
-def draw_special_curve(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
+def draw_special_curve(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column) -> Axes:
     """Draw a curve of special points in the plane of its two parameters, as `SpecialCurve.to_xarray` gives it; returns `ax`."""
     ax = axes_or_new(ax, width, 0.75 * width)
     ax.plot(
-        *dataset["parameter"].values.T, color=INK, label=MARK_NAMES.get(str(dataset.attrs["kind"]), str(dataset.attrs["kind"]))
+        *dataset["parameter"].values.T,
+        color=LOOK.ink,
+        label=MARK_NAMES.get(str(dataset.attrs["kind"]), str(dataset.attrs["kind"])),
     )
     first, second = (str(path) for path in dataset["path"].values)
     ax.set_xlabel(parameter_name(first))
@@ -74,7 +72,7 @@ def draw_special_curve(dataset: Any, *, ax: Axes | None = None, width: float = S
 
 
 @drawing
-def draw_attractors_along(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * SINGLE_COLUMN) -> Axes:
+def draw_attractors_along(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * LOOK.single_column) -> Axes:
     """Draw the amplitudes of `attractors_along`, each attractor in a colour of its own; returns `ax`."""
     ax = axes_or_new(ax, width, 0.62 * width)
     numbers = [int(number) for number in dataset["attractor"].values]
@@ -82,7 +80,7 @@ def draw_attractors_along(dataset: Any, *, ax: Axes | None = None, width: float 
         sizes = dataset["amplitude"].sel(attractor=number).values
         kinds = {str(kind) for kind in dataset["kind"].sel(attractor=number).values} - {""}
         label = f"{number}: {' or '.join(sorted(kinds))}"
-        ax.plot(dataset["value"].values, sizes, color=colour, marker=".", ms=3.5, mec=INK, mew=0.2, label=label)
+        ax.plot(dataset["value"].values, sizes, color=colour, marker=".", ms=3.5, mec=LOOK.ink, mew=0.2, label=label)
     ax.set_xlim(*np.sort(dataset["value"].values[[0, -1]]))
     ax.set_xlabel(parameter_name(dataset.attrs["path"]))
     ax.set_ylabel(f"{quantity_name(dataset, 'amplitude')}{unit_in_brackets(dataset['amplitude'])}")
@@ -91,12 +89,12 @@ def draw_attractors_along(dataset: Any, *, ax: Axes | None = None, width: float 
 
 
 FEIGENBAUM = 4.669201609102990  # the limit of the ratios of a cascade
-SETTLED: dict[str, Any] = {"color": INK, "linestyle": "none", "marker": "+", "markersize": 5.0, "markeredgewidth": 0.6}
-FACES = {True: ("stable orbit", STABLE, STABLE, "o"), False: ("unstable orbit", "white", UNSTABLE, "s")}
+SETTLED: dict[str, Any] = {"color": LOOK.ink, "linestyle": "none", "marker": "+", "markersize": 5.0, "markeredgewidth": 0.6}
+FACES = {True: ("stable orbit", LOOK.stable, LOOK.stable, "o"), False: ("unstable orbit", "white", LOOK.unstable, "s")}
 
 
 @drawing
-def draw_search(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * SINGLE_COLUMN) -> Axes:
+def draw_search(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * LOOK.single_column) -> Axes:
     """Draw the amplitudes of the orbits of `search_orbits`, stable ones filled, unstable ones open; returns `ax`.
 
     Beside a mark is the period, if it is not 1; crosses are the orbits on which simulated motions have settled.
@@ -130,12 +128,12 @@ def draw_cascade(dataset: Any, *, ax: Axes | None = None, figure: Figure | None 
     """
     if ax is not None:
         return _draw_doublings(ax, dataset)
-    figure = new_figure(DOUBLE_COLUMN, 68.0) if figure is None else figure
+    figure = new_figure(LOOK.double_column, 68.0) if figure is None else figure
     left, right = figure.subplots(1, 2)
     _draw_doublings(left, dataset)
     periods, ratios = dataset["period"].values, dataset["ratio"].values
-    right.axhline(FEIGENBAUM, label=f"limit {FEIGENBAUM:.4f}", **LIMIT_LINE)
-    right.plot(periods[: len(ratios)], ratios, marker="s", ms=4.0, mfc="white", **STABLE_LINE)
+    right.axhline(FEIGENBAUM, label=f"limit {FEIGENBAUM:.4f}", **LOOK.limit_line)
+    right.plot(periods[: len(ratios)], ratios, marker="s", ms=4.0, mfc="white", **LOOK.stable_line)
     right.set_ylabel("ratio of successive distances")
     right.legend(loc="best")
     _name_periods(right, periods)
@@ -144,7 +142,7 @@ def draw_cascade(dataset: Any, *, ax: Axes | None = None, figure: Figure | None 
 
 def _draw_doublings(ax: Axes, dataset: Any) -> Axes:
     periods = dataset["period"].values
-    ax.plot(periods, dataset["parameter"].values, marker="s", ms=4.0, mfc="white", **STABLE_LINE)
+    ax.plot(periods, dataset["parameter"].values, marker="s", ms=4.0, mfc="white", **LOOK.stable_line)
     ax.set_ylabel(f"{parameter_name(dataset.attrs['path'])} of the doubling")
     _name_periods(ax, periods)
     return ax
@@ -158,11 +156,11 @@ def _name_periods(ax: Axes, periods: np.ndarray) -> None:
     ax.set_xlabel("forcing periods of the orbit that doubles")
 
 
-BACKBONE_LINE: dict[str, Any] = {"color": INK, "linestyle": (0, (6, 1.5, 1, 1.5)), "linewidth": 1.1}
+BACKBONE_LINE: dict[str, Any] = {"color": LOOK.ink, "linestyle": (0, (6, 1.5, 1, 1.5)), "linewidth": 1.1}
 
 
 @drawing
-def draw_backbone(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
+def draw_backbone(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column) -> Axes:
     """Draw the dataset of `backbone`: amplitudes over the frequencies of the free orbits; returns the axes."""
     ax = axes_or_new(ax, width, 0.75 * width)
     ax.plot(dataset["frequency"].values, dataset["amplitude"].values, **BACKBONE_LINE)

@@ -14,15 +14,7 @@ from matplotlib.figure import Figure
 
 from saltus.errors import ParameterError
 from saltus.plots.conventions import (
-    DOUBLE_COLUMN,
-    FAINT,
-    INK,
-    LIMIT,
-    LIMIT_LINE,
-    SEPARATRIX,
-    SINGLE_COLUMN,
-    STABLE,
-    UNSTABLE,
+    LOOK,
     axes_or_new,
     cell_edges,
     drawing,
@@ -39,8 +31,15 @@ if TYPE_CHECKING:
     import xarray
 
 DASHED = (0, (4, 1.5))
-LINES: tuple[dict[str, Any], ...] = ({"color": STABLE, "ls": "-"}, {"color": UNSTABLE, "ls": DASHED})
-PAIRS = (STABLE, UNSTABLE, LIMIT, "#E69F00", INK, SEPARATRIX)  # of more than two coordinates, two of each colour
+LINES: tuple[dict[str, Any], ...] = ({"color": LOOK.stable, "ls": "-"}, {"color": LOOK.unstable, "ls": DASHED})
+PAIRS = (
+    LOOK.stable,
+    LOOK.unstable,
+    LOOK.limit,
+    "#E69F00",
+    LOOK.ink,
+    LOOK.separatrix,
+)  # of more than two coordinates, two of each colour
 
 
 @drawing
@@ -52,7 +51,7 @@ def draw_motion(dataset: xarray.Dataset, *, ax: Axes | None = None, figure: Figu
     axes only the coordinates over time are drawn.
     """
     if ax is None:
-        figure = new_figure(DOUBLE_COLUMN, 68.0) if figure is None else figure
+        figure = new_figure(LOOK.double_column, 68.0) if figure is None else figure
         history, portrait = figure.subplots(1, 2, width_ratios=(1.75, 1))
     else:
         history, portrait = ax, None
@@ -118,11 +117,11 @@ def _portrait(ax: Any, arc: tuple[np.ndarray, np.ndarray, np.ndarray], period: f
     time, position, velocity = arc
     late = time >= time[-1] - period * (1 + 1e-9) if period else np.full(time.size, True)
     if not late.all():
-        ax.plot(position, velocity, color=FAINT, lw=0.6, zorder=1)
+        ax.plot(position, velocity, color=LOOK.faint, lw=0.6, zorder=1)
     ax.plot(position[late], velocity[late], lw=1.1, zorder=2, **line)
     known = np.flatnonzero(np.isfinite(velocity))
-    for index, face in ((known[0], "white"), (known[-1], INK)):
-        ax.plot(position[index], velocity[index], marker="o", ms=4, mfc=face, mec=INK, mew=0.8, ls="none", zorder=3)
+    for index, face in ((known[0], "white"), (known[-1], LOOK.ink)):
+        ax.plot(position[index], velocity[index], marker="o", ms=4, mfc=face, mec=LOOK.ink, mew=0.8, ls="none", zorder=3)
 
 
 def _labels(history: Any, portrait: Any, dataset: xarray.Dataset, names: list[str]) -> None:
@@ -132,14 +131,14 @@ def _labels(history: Any, portrait: Any, dataset: xarray.Dataset, names: list[st
         places = ", ".join(f"${symbol(name)}$" for name in names)
         speeds = ", ".join(rf"$\dot{{{symbol(name)}}}$" for name in names)
     history.set(xlabel=r"$\tau$", ylabel=f"{places}{unit}", xlim=(float(dataset.time[0]), _end(dataset)))
-    history.axhline(0.0, color=FAINT, lw=0.5, zorder=0)
+    history.axhline(0.0, color=LOOK.faint, lw=0.5, zorder=0)
     if portrait is None:
         if len(names) > 1:
             history.legend(loc="best")
         return
     portrait.set(xlabel=f"{places}{unit}", ylabel=f"{speeds}{unit}")
-    portrait.axhline(0.0, color=FAINT, lw=0.5, zorder=0)
-    portrait.axvline(0.0, color=FAINT, lw=0.5, zorder=0)
+    portrait.axhline(0.0, color=LOOK.faint, lw=0.5, zorder=0)
+    portrait.axvline(0.0, color=LOOK.faint, lw=0.5, zorder=0)
     if len(names) > 1:
         above = "outside upper center" if history.figure.get_layout_engine() is not None else "upper center"
         history.figure.legend(*history.get_legend_handles_labels(), loc=above, ncols=min(len(names), 4))
@@ -183,7 +182,7 @@ def draw_sensitivities(dataset: Any, *, ax: Axes | None = None, width: float | N
     ax.imshow(np.abs(derivative), cmap="Greys", norm=PowerNorm(0.5, 0.0, DARKEST * largest), aspect="auto")
     for (row, column), value in np.ndenumerate(derivative):
         text = f"{value:.4g}".replace("-", "\u2212") if np.isfinite(value) else "undefined"
-        ax.text(column, row, text, ha="center", va="center", color=INK)
+        ax.text(column, row, text, ha="center", va="center", color=LOOK.ink)
     starts = [name.removeprefix("start_") for name in to]
     symbols = [
         rf"${state_symbol(start, plane)}(\tau_0)$" if start != name else parameter_symbol(name)
@@ -202,7 +201,9 @@ OWN = ("period", "state", "column")  # dimensions within one motion, and not of 
 
 
 @drawing
-def draw_ensemble(dataset: Any, quantity: str | None = None, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
+def draw_ensemble(
+    dataset: Any, quantity: str | None = None, *, ax: Axes | None = None, width: float = LOOK.single_column
+) -> Axes:
     """Draw a variable of `simulate_many`, by default the first coordinate at the end, over one dimension or two; returns `ax`.
 
     Raises
@@ -220,7 +221,7 @@ def draw_ensemble(dataset: Any, quantity: str | None = None, *, ax: Axes | None 
     names = list(axes)
     ax.set_xlabel(names[0])
     if len(names) == 1:
-        ax.plot(axes[names[0]], values.values, color=STABLE, marker=".", ms=3.0, lw=0.6)
+        ax.plot(axes[names[0]], values.values, color=LOOK.stable, marker=".", ms=3.0, lw=0.6)
         ax.set_ylabel(label)
         return ax
     mesh = ax.pcolormesh(*(cell_edges(axis) for axis in axes.values()), values.values.T, rasterized=True)
@@ -237,9 +238,9 @@ def symbol_of(quantity: str) -> str:
 
 
 WAYS: dict[str, dict[str, Any]] = {
-    "up": {"color": STABLE, "marker": "^", "markersize": 2.6, "linestyle": "-", "linewidth": 0.9, "markeredgewidth": 0.0},
+    "up": {"color": LOOK.stable, "marker": "^", "markersize": 2.6, "linestyle": "-", "linewidth": 0.9, "markeredgewidth": 0.0},
     "down": {
-        "color": UNSTABLE,
+        "color": LOOK.unstable,
         "marker": "v",
         "markersize": 2.6,
         "linestyle": (0, (4, 2)),
@@ -251,7 +252,7 @@ BAND = "#ececec"  # where up and down differ
 
 
 @drawing
-def draw_sweep(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * SINGLE_COLUMN) -> Axes:
+def draw_sweep(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * LOOK.single_column) -> Axes:
     """Draw the dataset of `frequency_sweep`: amplitudes up and down, jumps as arrows, hysteresis in grey; returns the axes."""
     ax = axes_or_new(ax, width, 0.62 * width)
     values = dataset["value"].values
@@ -298,7 +299,7 @@ def limit_lines(ax: Any, angle: float, label: str | None = None, axis: str = "x"
     low, high = ax.get_xlim() if axis == "x" else ax.get_ylim()
     for value in (-angle, angle):
         if low < value < high:
-            (ax.axvline if axis == "x" else ax.axhline)(value, zorder=1, **LIMIT_LINE)
+            (ax.axvline if axis == "x" else ax.axhline)(value, zorder=1, **LOOK.limit_line)
             if label and axis == "x":
                 ax.annotate(
                     label,
@@ -308,6 +309,6 @@ def limit_lines(ax: Any, angle: float, label: str | None = None, axis: str = "x"
                     textcoords="offset points",
                     ha="center",
                     va="bottom",
-                    color=LIMIT,
+                    color=LOOK.limit,
                     fontsize=7,
                 )

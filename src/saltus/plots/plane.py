@@ -10,14 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from saltus.plots.conventions import (
-    FAINT,
-    INK,
-    SEPARATRIX_LINE,
-    SINGLE_COLUMN,
-    STABLE,
-    STABLE_LINE,
-    UNSTABLE,
-    UNSTABLE_LINE,
+    LOOK,
     axes_or_new,
     drawing,
     legend_of,
@@ -32,7 +25,7 @@ ARROWS = 0.6  # window widths between arrows along a motion
 
 
 @drawing
-def draw_plane(dataset: Any, *, ax: Axes | None = None, width: float = 1.5 * SINGLE_COLUMN) -> Axes:
+def draw_plane(dataset: Any, *, ax: Axes | None = None, width: float = 1.5 * LOOK.single_column) -> Axes:
     """Draw a dataset of `saltus.phase_portrait`; returns the axes.
 
     Stable equilibria are filled, unstable ones open. Motions from given starts are drawn to their ends; motions from starts that
@@ -43,15 +36,15 @@ def draw_plane(dataset: Any, *, ax: Axes | None = None, width: float = 1.5 * SIN
     own, ax = ax is None, axes_or_new(ax, width, 0.85 * width)
     ax.set_xlim(*window[0])
     ax.set_ylim(*window[1])
-    ax.axhline(0.0, color=FAINT, lw=0.4, zorder=0)
+    ax.axhline(0.0, color=LOOK.faint, lw=0.4, zorder=0)
     if "contact" in dataset.attrs:
-        ax.axvline(float(dataset.attrs["contact"]), color=FAINT, lw=1.2, zorder=0)
+        ax.axvline(float(dataset.attrs["contact"]), color=LOOK.faint, lw=1.2, zorder=0)
     motions = list(zip(dataset[name].values, dataset["velocity"].values, strict=True))
     for x, v in lines_apart(motions, window) if dataset.attrs.get("starts") == "spread" else motions:
-        ax.plot(x, v, color=STABLE, lw=0.7, zorder=2)
+        ax.plot(x, v, color=LOOK.stable, lw=0.7, zorder=2)
         draw_arrows(ax, x, v, ARROWS)
     for x, v in zip(dataset[f"separatrix_{name}"].values, dataset["separatrix_velocity"].values, strict=True):
-        ax.plot(x, v, zorder=3, **SEPARATRIX_LINE)
+        ax.plot(x, v, zorder=3, **LOOK.separatrix_line)
     stable = dataset["stable"].values.astype(bool)
     fixed_points(ax, dataset["equilibrium"].values, stable)
     for artist in (*ax.texts, *ax.lines):
@@ -65,13 +58,13 @@ def draw_plane(dataset: Any, *, ax: Axes | None = None, width: float = 1.5 * SIN
 def _legend(ax: Axes, own: bool, stable: np.ndarray, separatrices: bool) -> None:
     """A legend of the stable and unstable equilibria and the separatrices, as far as there are any."""
     dot: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 4.5}
-    handles = [Line2D([], [], color=STABLE, lw=0.7, label="motion")]
+    handles = [Line2D([], [], color=LOOK.stable, lw=0.7, label="motion")]
     if stable.any():
-        handles.append(Line2D([], [], color=STABLE, label="stable equilibrium", **dot))
+        handles.append(Line2D([], [], color=LOOK.stable, label="stable equilibrium", **dot))
     if not stable.all():
-        handles.append(Line2D([], [], mfc="white", mec=UNSTABLE, label="unstable equilibrium", **dot))
+        handles.append(Line2D([], [], mfc="white", mec=LOOK.unstable, label="unstable equilibrium", **dot))
     if separatrices:
-        handles.append(Line2D([], [], label="separatrix", **SEPARATRIX_LINE))
+        handles.append(Line2D([], [], label="separatrix", **LOOK.separatrix_line))
     legend_of(ax, own, handles, ncols=len(handles), columnspacing=1.4, handletextpad=0.5)
 
 
@@ -102,7 +95,7 @@ def draw_arrows(ax: Any, x: np.ndarray, v: np.ndarray, spacing: float, last: int
     way = travelled(np.stack([x / (right - left), v / (high - low)], axis=1))
     for at in sorted({int(np.searchsorted(way, place)) for place in np.arange(SPACING.first_arrow, way[last], spacing)}):
         if left < x[at] < right and low < v[at] < high:
-            arrow_along(ax, x, v, at, STABLE)
+            arrow_along(ax, x, v, at, LOOK.stable)
 
 
 def lines_apart(motions: list[tuple[np.ndarray, np.ndarray]], window: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -141,14 +134,14 @@ SADDLE: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 4.5,
 
 
 @drawing
-def draw_manifold(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
+def draw_manifold(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column) -> Axes:
     """Draw the manifold of a saddle orbit at phase 0 of the load, the stable one solid, the unstable one dashed; returns `ax`."""
     ax = axes_or_new(ax, width, 0.85 * width)
     plane = plane_of(dataset)
     stable = bool(dataset.attrs["stable"])
-    line, label = (STABLE_LINE, "stable manifold") if stable else (UNSTABLE_LINE, "unstable manifold")
+    line, label = (LOOK.stable_line, "stable manifold") if stable else (LOOK.unstable_line, "unstable manifold")
     ax.plot(*(dataset[name].values for name in plane), label=label, **{**line, "linewidth": 0.8})
-    ax.plot(*(dataset[f"orbit_{name}"].values for name in plane), markeredgecolor=INK, label="saddle orbit", **SADDLE)
+    ax.plot(*(dataset[f"orbit_{name}"].values for name in plane), markeredgecolor=LOOK.ink, label="saddle orbit", **SADDLE)
     ax.set_xlabel(state_label(dataset, plane[0], plane, " at phase 0"))
     ax.set_ylabel(state_label(dataset, plane[1], plane, " at phase 0"))
     marks = marks_of(ax)
@@ -157,12 +150,12 @@ def draw_manifold(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE
 
 
 @drawing
-def draw_separatrix(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
+def draw_separatrix(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column) -> Axes:
     """Draw a separatrix in the phase plane and its saddle, an open mark; returns `ax`."""
     ax = axes_or_new(ax, width, 0.85 * width)
     plane = plane_of(dataset)
-    ax.plot(*(dataset[name].values for name in plane), label="separatrix", **SEPARATRIX_LINE)
-    ax.plot(float(dataset.attrs["saddle"]), 0.0, markeredgecolor=UNSTABLE, label="saddle", **SADDLE)
+    ax.plot(*(dataset[name].values for name in plane), label="separatrix", **LOOK.separatrix_line)
+    ax.plot(float(dataset.attrs["saddle"]), 0.0, markeredgecolor=LOOK.unstable, label="saddle", **SADDLE)
     ax.set_xlabel(state_label(dataset, plane[0], plane))
     ax.set_ylabel(state_label(dataset, plane[1], plane))
     marks = marks_of(ax)
@@ -174,8 +167,10 @@ def fixed_points(ax: Any, theta: np.ndarray, stable: np.ndarray, size: float = 4
     """Equilibria on the axis theta' = 0: filled blue where stable, open red where unstable."""
     theta, stable = np.asarray(theta), np.asarray(stable, dtype=bool)
     common: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": size, "zorder": 6, "clip_on": False}
-    ax.plot(theta[stable], 0 * theta[stable], markerfacecolor=STABLE, markeredgecolor=STABLE, **common)
-    ax.plot(theta[~stable], 0 * theta[~stable], markerfacecolor="white", markeredgecolor=UNSTABLE, markeredgewidth=1.0, **common)
+    ax.plot(theta[stable], 0 * theta[stable], markerfacecolor=LOOK.stable, markeredgecolor=LOOK.stable, **common)
+    ax.plot(
+        theta[~stable], 0 * theta[~stable], markerfacecolor="white", markeredgecolor=LOOK.unstable, markeredgewidth=1.0, **common
+    )
 
 
 def arrow_along(ax: Any, x: np.ndarray, y: np.ndarray, at: int, color: str, size: float = 7.0) -> None:

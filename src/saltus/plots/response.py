@@ -20,14 +20,7 @@ from saltus.branch_tables import branches_of
 from saltus.errors import ParameterError, shown
 from saltus.plots.branch_cuts import ModelValidity, margins_of, smooth_lines, validity_of
 from saltus.plots.conventions import (
-    DOUBLE_COLUMN,
-    INK,
-    LIMIT,
-    LIMIT_LINE,
-    PALE_STABLE,
-    PALE_UNSTABLE,
-    STABLE_LINE,
-    UNSTABLE_LINE,
+    LOOK,
     drawing,
     is_flat,
     new_figure,
@@ -51,13 +44,13 @@ class ResponseSettings:
 SETTINGS = ResponseSettings()
 
 QSB_LINE: dict[str, Any] = {"color": "#7b2d9b", "linestyle": (0, (3, 2)), "linewidth": 1.0}
-FARTHEST_LINE: dict[str, Any] = {"color": LIMIT, "linestyle": (0, (1, 1.2)), "linewidth": 1.2}
+FARTHEST_LINE: dict[str, Any] = {"color": LOOK.limit, "linestyle": (0, (1, 1.2)), "linewidth": 1.2}
 # Heavy where the model holds, thin where an assumption fails, thin and pale beyond a limit: distinct in grey as well.
 WEIGHTS = {ModelValidity.HOLDS: 1.7, ModelValidity.ASSUMPTION: 0.75, ModelValidity.LIMIT: 0.75}
-PALE = {True: PALE_STABLE, False: PALE_UNSTABLE}
+PALE = {True: LOOK.pale_stable, False: LOOK.pale_unstable}
 BANDS = {"QP": "#cfe6f7", "CH": "#fbd9b0"}  # quasi-periodic light blue, chaotic light orange
 BAND_NAMES = {"QP": "quasi-periodic", "CH": "chaotic"}
-DOTS: dict[str, Any] = {"color": INK, "linestyle": "none", "marker": ".", "markersize": 2.4, "markeredgewidth": 0.0}
+DOTS: dict[str, Any] = {"color": LOOK.ink, "linestyle": "none", "marker": ".", "markersize": 2.4, "markeredgewidth": 0.0}
 MARKS: dict[str, dict[str, Any]] = {
     "LP": {"marker": "o", "markersize": 2.8},
     "PD": {"marker": "s", "markersize": 2.7},
@@ -112,7 +105,7 @@ def draw_branches(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: fl
 
 def line_style(stable: bool, validity: ModelValidity, weight: float = 1.0) -> dict[str, Any]:
     """The line style of motions of this stability and validity, in `weight` times the usual width."""
-    style = {**(STABLE_LINE if stable else UNSTABLE_LINE), "linewidth": weight * WEIGHTS[validity]}
+    style = {**(LOOK.stable_line if stable else LOOK.unstable_line), "linewidth": weight * WEIGHTS[validity]}
     return style | ({"color": PALE[stable]} if validity is ModelValidity.LIMIT else {})
 
 
@@ -142,7 +135,7 @@ def special_places(spectrum: Any, kind: str, quantity: str = "amplitude") -> np.
 
 
 def _mark(style: dict[str, Any]) -> dict[str, Any]:
-    return {"markerfacecolor": "white", "markeredgecolor": INK, "markeredgewidth": 0.5, **style}
+    return {"markerfacecolor": "white", "markeredgecolor": LOOK.ink, "markeredgewidth": 0.5, **style}
 
 
 def draw_attractors(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: float = 1.0) -> None:
@@ -175,7 +168,7 @@ def draw_bands(ax: Any, spectrum: Any) -> None:
 def draw_limits(ax: Any, limits: Iterable[float], scale: float = 1.0, mirrored: bool = False) -> None:
     """Green lines at the straight line, dashed, and at the kinematic limit, dotted, those that fall inside the axes."""
     low, high = ax.get_ylim()
-    for angle, style in zip(limits, (LIMIT_LINE, FARTHEST_LINE), strict=False):
+    for angle, style in zip(limits, (LOOK.limit_line, FARTHEST_LINE), strict=False):
         for value in (angle / scale, *((-angle / scale,) if mirrored else ())):
             if low < value < high:
                 ax.axhline(value, zorder=2, **style)
@@ -202,7 +195,7 @@ def response_legend(where: Any, spectra: list[Any], *, limits: bool = True, crit
     handles, labels, handlers = line_handles([branch for spectrum in spectra for _, branch in branches_of(spectrum)])
     more: list[Any] = [Line2D([], [], label="direct simulation", **{**DOTS, "markersize": 4})]
     if limits:
-        more.append(Line2D([], [], label=r"straight line, $\pi-\beta_0$", **LIMIT_LINE))
+        more.append(Line2D([], [], label=r"straight line, $\pi-\beta_0$", **LOOK.limit_line))
         more.append(Line2D([], [], label=r"kinematic limit, $2(\pi-\beta_0)$", **FARTHEST_LINE))
     if critical:
         more.append(Line2D([], [], label="quasi-static bifurcation (QSB)", **QSB_LINE))
@@ -215,7 +208,7 @@ def response_legend(where: Any, spectra: list[Any], *, limits: bool = True, crit
     if isinstance(where, Axes):
         where.legend(**entries, handler_map=handlers, loc="best", handlelength=3.6)
         return
-    width = where.get_figwidth() * 25.4 / DOUBLE_COLUMN
+    width = where.get_figwidth() * 25.4 / LOOK.double_column
     letters = round(SETTINGS.letters * width / mpl.rcParams["font.size"])
     outside_legend(
         where,
@@ -269,7 +262,7 @@ def line_labels(branches: list[Any]) -> list[tuple[str, list[dict[str, Any]]]]:
     ]
 
 
-POINTS: dict[str, Any] = {"color": INK, "linestyle": "none", "marker": ".", "markeredgewidth": 0.0, "rasterized": True}
+POINTS: dict[str, Any] = {"color": LOOK.ink, "linestyle": "none", "marker": ".", "markeredgewidth": 0.0, "rasterized": True}
 
 
 @dataclass(frozen=True)
@@ -305,7 +298,7 @@ def draw_diagram(tree: Any, quantity: str | None = None, *, ax: Axes | None = No
     names, unit = tree.attrs["coordinate"], _unit(tree)
     simulated = "stroboscopic" in tree.children and ax is None
     if ax is None:
-        figure = new_figure(DOUBLE_COLUMN, 150.0 if simulated else 95.0) if figure is None else figure
+        figure = new_figure(LOOK.double_column, 150.0 if simulated else 95.0) if figure is None else figure
         axes = figure.subplots(1 + simulated, 1, sharex=True, squeeze=False, height_ratios=[3, 2][: 1 + simulated])[:, 0]
     else:
         axes = np.array([ax])

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from saltus import Harmonic, Load, RockingBlock, simulate
-from saltus.plots import DOUBLE_COLUMN, FAINT, INK, STABLE, new_figure, panel_label, shades, styled
+from saltus.plots import LOOK, new_figure, panel_label, shades, styled
 from saltus.theory import (
     rocking_energy_decreases,
     rocking_energy_jump,
@@ -87,7 +87,7 @@ def _model_jump(alpha: float, e: float, ground: float) -> float:
 @styled
 def draw(data: Any) -> Any:
     """(a) periods, (b) errors of the approximations, (c) energy jump."""
-    figure = new_figure(DOUBLE_COLUMN, 68.0)
+    figure = new_figure(LOOK.double_column, 68.0)
     axes = figure.subplots(1, 3)
     draw_periods(axes[0], data["period"])
     draw_errors(axes[1], data["period"])
@@ -106,7 +106,7 @@ def draw_periods(ax: Any, data: Any) -> None:
         name = rf"$\alpha={np.rad2deg(float(data['alpha'][i])):.0f}^\circ$"
         ax.plot(data["share"], data["exact"][i], color=colour, lw=1.2, label=name)
         ax.plot(data["dot"], data["simulated"][i], color=colour, ls="none", marker="o", ms=3)
-    ax.plot(data["share"], data["slender"][0], color=INK, ls=SLENDER_DASHES, lw=0.9, label="arccosh", zorder=1)
+    ax.plot(data["share"], data["slender"][0], color=LOOK.ink, ls=SLENDER_DASHES, lw=0.9, label="arccosh", zorder=1)
     ax.set_xlim(0, 1)
     ax.set_ylim(0, 22)
     ax.set_yticks(range(0, 21, 5))
@@ -121,8 +121,8 @@ def draw_errors(ax: Any, data: Any) -> None:
         for name, dashes in (("short", SHORT_DASHES), ("slender", SLENDER_DASHES)):
             error = abs(data[name][i] / data["exact"][i] - 1).values
             ax.plot(data["share"], error, color=colour, ls=dashes, lw=1.2)
-    ax.plot([], [], color=INK, ls=SHORT_DASHES, label=r"$4\sqrt{2|\theta_0|/\sin\alpha}$")
-    ax.plot([], [], color=INK, ls=SLENDER_DASHES, label="arccosh")
+    ax.plot([], [], color=LOOK.ink, ls=SHORT_DASHES, label=r"$4\sqrt{2|\theta_0|/\sin\alpha}$")
+    ax.plot([], [], color=LOOK.ink, ls=SLENDER_DASHES, label="arccosh")
     ax.set_yscale("log")
     ax.set_xlim(0, 1)
     ax.set_ylim(4e-7, 3)
@@ -136,10 +136,10 @@ def draw_jump(ax: Any, data: Any) -> None:
     ground, jump = data["ground"].values, data["jump"].values
     bound = float(data.attrs["bound"])
     ax.axvspan(ground[0], -bound, color="#ececec", lw=0, zorder=0)
-    ax.axhline(0.0, color=FAINT, lw=0.8)
-    ax.axvline(0.0, color=FAINT, lw=0.8)
-    ax.plot(ground, jump, color=STABLE, lw=1.2)
-    ax.plot(data["dot"], data["computed"], color=STABLE, ls="none", marker="o", ms=3)
+    ax.axhline(0.0, color=LOOK.faint, lw=0.8)
+    ax.axvline(0.0, color=LOOK.faint, lw=0.8)
+    ax.plot(ground, jump, color=LOOK.stable, lw=1.2)
+    ax.plot(data["dot"], data["computed"], color=LOOK.stable, ls="none", marker="o", ms=3)
     ax.set_xlim(ground[0], ground[-1])
     ax.set_xlabel(r"$\dot\zeta/\dot\theta^-$")
     ax.set_ylabel(r"$[\![\mathcal{T}\,]\!]$ / energy of rotation before")

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.plots import DOUBLE_COLUMN, new_figure, panel_label, styled
+from saltus.plots import LOOK, new_figure, panel_label, styled
 from saltus_paper.figures.harmonic_loads import AMPLITUDE, FREQUENCY
 
 REDUCED, FULL = "0.65", "#b2182b"  # grey and dark red
@@ -25,7 +25,7 @@ MEANINGS = (
 @styled
 def draw(data: Any) -> Any:
     """(a, b) Fig. 9, (c) Fig. 11, (d) fates in every variant, (e) where the reduced model is exact, (f) Fig. 14 at Omega = 1."""
-    figure = new_figure(DOUBLE_COLUMN, 215.0)
+    figure = new_figure(LOOK.double_column, 215.0)
     axes = figure.subplots(3, 2).ravel()
     reference = _reference(data["fig09"])
     for ax, amplitude in zip(axes[:2], (0.2, 1.0), strict=True):

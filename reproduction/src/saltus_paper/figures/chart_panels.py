@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from saltus.plots import (
-    DOUBLE_COLUMN,
+    LOOK,
     border_curves,
     chart_legend,
     draw_chart,
@@ -75,7 +75,7 @@ def panel(
 def _draw(data: Any, height: float) -> Any:
     """A chart for each panel, two in a row, all in one scale of colours."""
     panels = list(data.children.items())
-    figure = new_figure(DOUBLE_COLUMN, height)
+    figure = new_figure(LOOK.double_column, height)
     axes = figure.subplots(-(-len(panels) // 2), 2, squeeze=False).ravel()
     top = max(float(np.nanmax(tree["chart"]["amplitude"].values, initial=1e-3)) for _, tree in panels)
     cells, fast = None, False

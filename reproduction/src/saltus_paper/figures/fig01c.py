@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.plots import DASHES, INK, SINGLE_COLUMN, STABLE, new_figure, shades, styled
+from saltus.plots import LOOK, new_figure, shades, styled
 from saltus.theory import potential_energy
 from saltus_paper.claims.claim import Measured, measured
 from saltus_paper.figure_data import TOLERANCE, tree
@@ -30,7 +30,7 @@ def compute(samples: int = 1600) -> Any:
 @styled
 def draw(data: Any) -> Any:
     """One view of the space, with the plane of discontinuity."""
-    figure = new_figure(SINGLE_COLUMN, 78.0, layout=None)
+    figure = new_figure(LOOK.single_column, 78.0, layout=None)
     ax = figure.add_axes((-0.08, 0.0, 0.98, 1.08), projection="3d")
     draw_space(ax, data["space"])
     return figure
@@ -65,13 +65,13 @@ def draw_space(ax: Any, data: Any) -> None:
     order = (0, 1, 2)
     for i, colour in zip(order, shades(len(order), 0.0, 0.7), strict=False):
         theta, velocity, energy = (data[name][i].values for name in ("theta", "velocity", "energy"))
-        ax.plot(theta, velocity, energy, color=colour, ls=DASHES[0], lw=0.8, zorder=5 + i)
+        ax.plot(theta, velocity, energy, color=colour, ls=LOOK.dashes[0], lw=0.8, zorder=5 + i)
         ax.plot(theta[:1], velocity[:1], energy[:1], color=colour, marker="D", ms=3.5, zorder=9)
     potential = data["potential"].values
-    ax.plot(data["potential_theta"].values, 0 * potential, potential, color=INK, lw=0.6, zorder=4)
+    ax.plot(data["potential_theta"].values, 0 * potential, potential, color=LOOK.ink, lw=0.6, zorder=4)
     stable = data["stable"].values.astype(bool)
     points, levels = data["equilibrium"].values[stable], data["equilibrium_energy"].values[stable]
-    ax.plot(points, 0 * points, levels, color=STABLE, ls="none", marker="o", ms=5, zorder=10)
+    ax.plot(points, 0 * points, levels, color=LOOK.stable, ls="none", marker="o", ms=5, zorder=10)
     ax.set(xlim=(-2.6, 2.6), ylim=(-reach, reach), zlim=(floor, top))
     ax.set_xlabel(r"$\theta$ (rad)", labelpad=-1)
     ax.set_ylabel(r"$\dot\theta$", labelpad=1)

@@ -8,12 +8,8 @@ import numpy as np
 
 from saltus import UnitCell
 from saltus.plots import (
-    DOUBLE_COLUMN,
+    LOOK,
     draw_cell,
-    draw_frames,
-    label_deformed,
-    label_heights,
-    label_undeformed,
     new_figure,
     panel_label,
     styled,
@@ -58,14 +54,10 @@ def _state(cell: Any, theta_1: float, theta_2: float) -> Any:
 @styled
 def draw(data: Any) -> Any:
     """Both states side by side, at one scale."""
-    figure = new_figure(DOUBLE_COLUMN, 92.0)
+    figure = new_figure(LOOK.double_column, 92.0)
     left, right = figure.subplots(1, 2)
-    points = draw_cell(left, data["undeformed"].to_dataset())
-    label_undeformed(left, points, data["undeformed"])
-    points = draw_cell(right, data["deformed"].to_dataset())
-    label_deformed(right, points, data["deformed"])
-    label_heights(right, points, 2.12)
-    draw_frames(right, np.array([-0.95, -0.55]), points["lower_left"])
+    draw_cell(left, data["undeformed"].to_dataset(), "undeformed")
+    draw_cell(right, data["deformed"].to_dataset(), "deformed")
     for ax, label in ((left, "a"), (right, "b")):
         ax.set_xlim(-1.0, 2.4)
         ax.set_ylim(-0.72, 2.5)

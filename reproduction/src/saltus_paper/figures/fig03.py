@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from saltus import Load, Metainterface, System, UnitCell, simulate
-from saltus.plots import DASHES, DOUBLE_COLUMN, FAINT, STABLE, UNSTABLE, arrow_along, new_figure, panel_label, styled
+from saltus.plots import LOOK, arrow_along, new_figure, panel_label, styled
 from saltus_paper.claims.claim import Measured, measured
 from saltus_paper.figure_data import TOLERANCE, dataset, tree
 from saltus_paper.figures.figure import paper_figure
@@ -48,7 +48,7 @@ def compute(alpha0: float = 45.0, samples: int = 400) -> Any:
 @styled
 def draw(data: Any) -> Any:
     """(a) over time, (b) in the phase plane."""
-    figure = new_figure(DOUBLE_COLUMN, 66.0)
+    figure = new_figure(LOOK.double_column, 66.0)
     left, right = figure.subplots(1, 2)
     draw_history(left, data["approach"])
     draw_phase(right, data["approach"])
@@ -81,8 +81,8 @@ def measure(data: Any) -> dict[str, Measured]:
     }
 
 
-PHI: dict[str, Any] = {"color": UNSTABLE, "ls": DASHES[1], "lw": 1.2}
-THETA: dict[str, Any] = {"color": STABLE, "ls": "-", "lw": 1.2}
+PHI: dict[str, Any] = {"color": LOOK.unstable, "ls": LOOK.dashes[1], "lw": 1.2}
+THETA: dict[str, Any] = {"color": LOOK.stable, "ls": "-", "lw": 1.2}
 
 
 def draw_history(ax: Any, data: Any) -> None:
@@ -90,7 +90,7 @@ def draw_history(ax: Any, data: Any) -> None:
     time = -data["to_go"].values
     ax.plot(time, abs(data["phi"].values), label=r"$|\varphi|$", **PHI)
     ax.plot(time, abs(data["theta"].values), label=r"$|\theta|$", **THETA)
-    ax.axvline(0.0, color=FAINT, lw=0.8)
+    ax.axvline(0.0, color=LOOK.faint, lw=0.8)
     ax.set_xlim(time[0], 0.08)
     ax.set_ylim(0, None)
     ax.set_xlabel(r"$\tau-\tau_*$")
@@ -109,7 +109,12 @@ def draw_phase(ax: Any, data: Any, highest: float = 3.2) -> None:
     ax.set_xlabel(r"$|\varphi|,\ |\theta|$ (rad)")
     ax.set_ylabel(r"$|\dot\varphi|,\ |\dot\theta|$")
     ax.annotate(
-        r"$|\dot\varphi|\to\infty$", xy=(0.115, 0.97), xycoords=("data", "axes fraction"), ha="left", va="top", color=UNSTABLE
+        r"$|\dot\varphi|\to\infty$",
+        xy=(0.115, 0.97),
+        xycoords=("data", "axes fraction"),
+        ha="left",
+        va="top",
+        color=LOOK.unstable,
     )
     ax.legend(loc="center right")
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.plots import DOUBLE_COLUMN, new_figure, panel_label, styled
+from saltus.plots import LOOK, new_figure, panel_label, styled
 from saltus_paper.claims.claim import Measured, measured
 from saltus_paper.figure_data import TOLERANCE, tree
 from saltus_paper.figures.figure import paper_figure
@@ -38,7 +38,7 @@ def compute(samples: int = 900) -> Any:
 @styled
 def draw(data: Any) -> Any:
     """Three panels on one pair of axes."""
-    figure = new_figure(DOUBLE_COLUMN, 68.0)
+    figure = new_figure(LOOK.double_column, 68.0)
     axes = figure.subplots(1, 3, sharey=True)
     for ax, name in zip(axes, "abc", strict=True):
         draw_portrait(ax, data[name], (-2.45, 2.45), (-0.95, 0.95))

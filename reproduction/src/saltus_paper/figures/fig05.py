@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.plots import DOUBLE_COLUMN, new_figure, panel_label, styled
+from saltus.plots import LOOK, new_figure, panel_label, styled
 from saltus_paper.claims.claim import Measured, measured
 from saltus_paper.figure_data import TOLERANCE, tree
 from saltus_paper.figures.figure import paper_figure
@@ -42,7 +42,7 @@ def compute(samples: int = 1200) -> Any:
 @styled
 def draw(data: Any) -> Any:
     """Two panels with axes of their own."""
-    figure = new_figure(DOUBLE_COLUMN, 84.0)
+    figure = new_figure(LOOK.double_column, 84.0)
     axes = figure.subplots(1, 2)
     for ax, name in zip(axes, "ab", strict=True):
         draw_portrait(ax, data[name], *AXES[name])

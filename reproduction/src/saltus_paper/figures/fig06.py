@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from saltus import EnergyRestitution, Load, Metainterface, System, VelocityReduction, simulate
-from saltus.plots import DASHES, DOUBLE_COLUMN, FAINT, new_figure, panel_label, shades, styled
+from saltus.plots import LOOK, new_figure, panel_label, shades, styled
 from saltus.theory import total_energy, unloaded_peak_ratio, unloaded_period
 from saltus_paper.claims.claim import Measured, measured
 from saltus_paper.figure_data import TOLERANCE, dataset, tree
@@ -78,7 +78,7 @@ def _histories(cases: list[tuple[float, float]], impact: Any, samples: int, thet
 @styled
 def draw(data: Any) -> Any:
     """(a) over k; (b) over m, with the velocity kept and with the energy kept at impacts."""
-    figure = new_figure(DOUBLE_COLUMN, 74.0)
+    figure = new_figure(LOOK.double_column, 74.0)
     axes = figure.subplots(1, 3, sharey=True)
     panels = (("a", "a", "stiffness_ratio", "k", ""), ("b_velocity", "b", "mass_ratio", "m", ": $e=1$"))
     for ax, (name, label, case, symbol, law) in zip(
@@ -177,9 +177,9 @@ def _ratio(panel: Any) -> np.ndarray:
 
 def draw_histories(ax: Any, data: Any, names: list[str], theta0: float) -> None:
     """theta(case, phase) / abs(theta0) over tau / T0, which differ in shade and dashes."""
-    ax.axhline(0.0, color=FAINT, lw=1.2, zorder=0)
+    ax.axhline(0.0, color=LOOK.faint, lw=1.2, zorder=0)
     for i, (name, colour) in enumerate(zip(names, shades(len(names)), strict=True)):
-        ax.plot(data["phase"], data["theta"][i] / abs(theta0), color=colour, ls=DASHES[i], lw=1.1, label=name)
+        ax.plot(data["phase"], data["theta"][i] / abs(theta0), color=colour, ls=LOOK.dashes[i], lw=1.1, label=name)
     ax.set_xlim(0, float(data["phase"][-1]))
     ax.set_ylim(-1.25, 3.9)
     ax.set_xlabel(r"$\tau\,/\,T_0$")

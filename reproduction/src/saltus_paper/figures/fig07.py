@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from saltus import Harmonic, Load, Metainterface, System, VelocityReduction, simulate
-from saltus.plots import DASHES, DOUBLE_COLUMN, new_figure, panel_label, shades, styled
+from saltus.plots import LOOK, new_figure, panel_label, shades, styled
 from saltus.theory import peaks, potential_energy, reciprocal
 from saltus_paper.claims.claim import Measured, measured
 from saltus_paper.figure_data import TOLERANCE, dataset, scalar_dataset, scalars, tree
@@ -145,7 +145,7 @@ def _balance(stiffness: float = 5.0, vertical: float = -0.5, theta0: float = np.
 @styled
 def draw(data: Any) -> Any:
     """(a) over the initial rotation, (b) over the vertical load."""
-    figure = new_figure(DOUBLE_COLUMN, 76.0)
+    figure = new_figure(LOOK.double_column, 76.0)
     left, right = figure.subplots(1, 2, sharey=True)
     angles = [rf"${round(np.rad2deg(float(a))):d}^\circ$" for a in data["a"]["theta0"]]
     loads = [rf"${float(v) + 0.0:g}$" for v in data["b"]["vertical"]]
@@ -218,7 +218,7 @@ def draw_family(ax: Any, family: Any, names: list[str], title: str) -> None:
     """Curves ratio(curve, stiffness_ratio) with dots simulated(curve, dot), which differ in shade and dashes."""
     colours = shades(family.sizes["curve"])
     for i, (name, colour) in enumerate(zip(names, colours, strict=True)):
-        ax.plot(family["stiffness_ratio"], family["ratio"][i], color=colour, ls=DASHES[i], lw=1.2, label=name)
+        ax.plot(family["stiffness_ratio"], family["ratio"][i], color=colour, ls=LOOK.dashes[i], lw=1.2, label=name)
         ax.plot(family["dot"], family["simulated"][i], color=colour, ls="none", marker="o", ms=3.2, clip_on=False, zorder=4)
     ax.set_xscale("log")
     ax.set_xlim(1, float(family["stiffness_ratio"][-1]))

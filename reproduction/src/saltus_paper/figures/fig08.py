@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from saltus import Harmonic, Load, Metainterface, Stop, System, simulate
-from saltus.plots import DOUBLE_COLUMN, INK, STABLE_LINE, UNSTABLE_LINE, arrow_along, new_figure, panel_label, styled
+from saltus.plots import LOOK, arrow_along, new_figure, panel_label, styled
 from saltus.theory import (
     critical_horizontal,
     equilibria,
@@ -137,7 +137,7 @@ def count_unloaded(beta0: float, vertical: float) -> int:
 @styled
 def draw(data: Any) -> Any:
     """(a) load (i), (b) load (iii), both over the domain."""
-    figure = new_figure(DOUBLE_COLUMN, 86.0)
+    figure = new_figure(LOOK.double_column, 86.0)
     axes = figure.subplots(1, 2, sharey=True)
     for ax, name, label in zip(axes, ("i", "iii"), "ab", strict=True):
         draw_domain(ax, data["borders"], label=label == "a")
@@ -208,10 +208,10 @@ def draw_domain(ax: Any, borders: Any, label: bool = True) -> None:
             lw=0,
             zorder=0,
         )
-        ax.plot(sign * critical, vertical, color=INK, lw=0.8, zorder=2)
-        ax.plot(sign * fold, folded, color=INK, lw=1.6, ls=(0, (1, 1)), zorder=2)
-    ax.axhline(0.0, color=INK, lw=0.4, zorder=1)
-    ax.axvline(0.0, color=INK, lw=0.4, zorder=1)
+        ax.plot(sign * critical, vertical, color=LOOK.ink, lw=0.8, zorder=2)
+        ax.plot(sign * fold, folded, color=LOOK.ink, lw=1.6, ls=(0, (1, 1)), zorder=2)
+    ax.axhline(0.0, color=LOOK.ink, lw=0.4, zorder=1)
+    ax.axvline(0.0, color=LOOK.ink, lw=0.4, zorder=1)
     if label:
         _labels(ax, float(np.interp(-1.5, vertical, critical)))
 
@@ -221,7 +221,7 @@ def draw_path(ax: Any, paths: Any) -> None:
     for i in range(paths.sizes["path"]):
         h, v = paths["horizontal"][i].values, paths["vertical"][i].values
         inside = bool(paths["within"][i])
-        style = STABLE_LINE if inside else UNSTABLE_LINE
+        style = LOOK.stable_line if inside else LOOK.unstable_line
         if np.ptp(v) == 0:  # there and back on one segment: drawn once, with an arrow at each end
             h, v = np.linspace(h.min(), h.max(), 50), np.full(50, v[0])
             arrow_along(ax, h[::-1], v, 48, style["color"])
@@ -234,7 +234,7 @@ def draw_path(ax: Any, paths: Any) -> None:
 
 
 def _labels(ax: Any, reach: float) -> None:
-    leader = {"arrowstyle": "-", "color": INK, "lw": 0.5, "shrinkA": 1, "shrinkB": 1}
+    leader = {"arrowstyle": "-", "color": LOOK.ink, "lw": 0.5, "shrinkA": 1, "shrinkB": 1}
     text: dict[str, Any] = {"fontsize": 8, "ha": "left", "va": "center", "arrowprops": leader}
     ax.text(0.0, -0.9, "monostable", ha="center", va="center", fontsize=8)
     ax.annotate(r"$\mathcal{V}\cos\beta_0=-|\mathcal{H}|\sin\beta_0$", xy=(-0.0441, -0.25), xytext=(-0.31, -0.06), **text)

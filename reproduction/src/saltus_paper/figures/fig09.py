@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from saltus.plots import (
-    DOUBLE_COLUMN,
+    LOOK,
     draw_branches,
     draw_limits,
     draw_response,
@@ -55,7 +55,7 @@ def draw(data: Any) -> Any:
     """(a) to (f), a panel for each amplitude, those with the most branches over the full width; details in insets."""
     panels = {name: tree for name, tree in data.children.items() if name in AMPLITUDES}
     rows: Any = _rows(list(panels))
-    figure = new_figure(DOUBLE_COLUMN, 25.0 + 54.0 * len(rows))
+    figure = new_figure(LOOK.double_column, 25.0 + 54.0 * len(rows))
     axes = figure.subplot_mosaic(rows)
     for name, tree in panels.items():
         draw_panel(axes[name], tree, name, rf"$\widehat{{\mathcal{{H}}}}={AMPLITUDES[name]:g}$", r"\theta_{\rm st}")

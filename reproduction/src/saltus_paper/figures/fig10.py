@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from saltus.flow import find_recurrence
-from saltus.plots import DOUBLE_COLUMN, highest, new_figure, response_legend, styled
+from saltus.plots import LOOK, highest, new_figure, response_legend, styled
 from saltus_paper.claims.claim import Measured
 from saltus_paper.figure_data import dataset, joined, with_groups
 from saltus_paper.figures.fig09 import draw_panel
@@ -63,7 +63,7 @@ def transients() -> Any:
 def draw(data: Any) -> Any:
     """(a) and (b), a row for each amplitude; beside each the motions between rest and the main branch."""
     panels = {name: tree for name, tree in data.children.items() if name in AMPLITUDES}
-    figure = new_figure(DOUBLE_COLUMN, 25.0 + 70.0 * len(panels))
+    figure = new_figure(LOOK.double_column, 25.0 + 70.0 * len(panels))
     axes = figure.subplots(len(panels), 2, squeeze=False, width_ratios=[2.6, 1])
     for (ax, beside), (name, tree) in zip(axes, panels.items(), strict=True):
         draw_panel(ax, tree, name, rf"$\widehat{{\zeta}}={AMPLITUDES[name]:g}$", r"\theta_{\rm eq}")

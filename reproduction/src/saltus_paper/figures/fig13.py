@@ -8,18 +8,7 @@ from typing import Any
 import numpy as np
 
 from saltus import simulate
-from saltus.plots import (
-    DOUBLE_COLUMN,
-    FAINT,
-    draw_response,
-    highest,
-    lowest,
-    new_figure,
-    note_missed,
-    panel_label,
-    response_legend,
-    styled,
-)
+from saltus.plots import LOOK, draw_response, highest, lowest, new_figure, note_missed, panel_label, response_legend, styled
 from saltus.theory import critical_horizontal
 from saltus_paper.claims.claim import Measured
 from saltus_paper.figure_data import TOLERANCE, dataset, joined, with_groups
@@ -85,13 +74,13 @@ def draw(data: Any) -> Any:
     """(a) the largest and (b) the least rotation of every motion; beside each the details near rest."""
     tree = data["a"]
     _, high = tree.attrs["bounds"]
-    figure = new_figure(DOUBLE_COLUMN, 150.0)
+    figure = new_figure(LOOK.double_column, 150.0)
     axes = figure.subplots(2, 2, sharex="col", width_ratios=[2.6, 1])
     for (ax, beside), (label, quantity) in zip(axes, (("a", "highest"), ("b", "lowest")), strict=True):
         ax.set_xlim(0.0, high)
         ax.set_ylim(*_range(tree, high, quantity))
         frame(ax, tree, mirrored=True)
-        ax.axhline(0.0, color=FAINT, linewidth=0.6, zorder=1)
+        ax.axhline(0.0, color=LOOK.faint, linewidth=0.6, zorder=1)
         draw_response(ax, tree, quantity)
         draw_beside(beside, ax, tree, (0.0, ZOOMED, *_range(tree, ZOOMED, quantity)), quantity)
         frame(beside, tree)

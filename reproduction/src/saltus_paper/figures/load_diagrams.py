@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus import simulate_many
 from saltus.plots import (
-    DOUBLE_COLUMN,
+    LOOK,
     draw_critical,
     draw_limits,
     draw_response,
@@ -91,7 +91,7 @@ def undeformed(system: Any, critical: float) -> Any:
 def _draw(data: Any, frequencies: Mapping[str, float], zoomed: float) -> Any:
     """A row for each frequency; beside each panel its part up to the amplitude `zoomed`, about Hcr."""
     panels = {name: tree for name, tree in data.children.items() if name in frequencies}
-    figure = new_figure(DOUBLE_COLUMN, 25.0 + 75.0 * len(panels))
+    figure = new_figure(LOOK.double_column, 25.0 + 75.0 * len(panels))
     axes = figure.subplots(len(panels), 2, squeeze=False, width_ratios=[2.6, 1])
     for (ax, beside), (name, tree) in zip(axes, panels.items(), strict=True):
         _, high = tree.attrs["bounds"]

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from saltus import Load, Metainterface, System, VelocityReduction, phase_portrait, simulate
-from saltus.plots import FAINT, SEPARATRIX_LINE, STABLE, draw_arrows, fixed_points, limit_lines
+from saltus.plots import LOOK, draw_arrows, fixed_points, limit_lines
 from saltus.theory import potential_energy, total_energy
 from saltus_paper.figure_data import TOLERANCE, dataset
 
@@ -139,16 +139,16 @@ def draw_portrait(ax: Any, data: Any, xlim: tuple[float, float], ylim: tuple[flo
     """One panel from a portrait of the paper; arrows come about every `spacing` panel widths along a trajectory."""
     ax.set_xlim(*xlim)
     ax.set_ylim(*ylim)
-    ax.axvline(0.0, color=FAINT, lw=1.2, zorder=0)
-    ax.axhline(0.0, color=FAINT, lw=0.4, zorder=0)
+    ax.axvline(0.0, color=LOOK.faint, lw=1.2, zorder=0)
+    ax.axhline(0.0, color=LOOK.faint, lw=0.4, zorder=0)
     for name in ("line_limit", "kinematic_limit"):
         limit_lines(ax, float(data[name]), rf"${np.rad2deg(float(data[name])):.0f}^\circ$")
     borders = data.isel(separatrix=data["separates"].values.astype(bool))
     for theta, velocity in zip(borders["separatrix_theta"].values, borders["separatrix_velocity"].values, strict=True):
-        ax.plot(theta, velocity, zorder=3, **SEPARATRIX_LINE)
+        ax.plot(theta, velocity, zorder=3, **LOOK.separatrix_line)
     for theta, velocity, hide in zip(data["theta"].values, data["velocity"].values, _hidden(data), strict=True):
         shown = np.where(hide, np.nan, velocity)
-        ax.plot(theta, shown, color=STABLE, lw=0.7, zorder=2)
+        ax.plot(theta, shown, color=LOOK.stable, lw=0.7, zorder=2)
         draw_arrows(ax, theta, shown, spacing, _first_return(theta / np.ptp(xlim), shown / np.ptp(ylim)))
     fixed_points(ax, data["equilibrium"].values, data["stable"].values)
     ax.set_xlabel(r"$\theta$ (rad)")

@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus import chaotic_bands, excludes_tori
 from saltus.flow import Ending
-from saltus.plots import DOUBLE_COLUMN, FAINT, POINTS, STABLE, UNSTABLE, draw_bands, new_figure, panel_label, styled
+from saltus.plots import LOOK, draw_bands, new_figure, panel_label, styled
 from saltus_paper.claims.claim import Measured, measured
 from saltus_paper.figure_data import joined
 from saltus_paper.figures.figure import paper_figure
@@ -47,7 +47,7 @@ def _panel(name: str, window: tuple[float, float], **options: Any) -> Any:
 @styled
 def draw(data: Any) -> Any:
     """For each load the angle at phase 0 of every motion, and its largest exponent with its error."""
-    figure = new_figure(DOUBLE_COLUMN, 120.0)
+    figure = new_figure(LOOK.double_column, 120.0)
     axes = figure.subplots(2, len(data.children), squeeze=False, sharex="col", height_ratios=[3, 2])
     for column, (name, tree) in zip(axes.T, data.children.items(), strict=True):
         _stroboscopic_states(column[0], tree)
@@ -64,17 +64,26 @@ def draw(data: Any) -> Any:
 
 def _stroboscopic_states(ax: Any, tree: Any) -> None:
     draw_bands(ax, tree)
-    ax.plot(tree["stroboscopic"]["value"], tree["stroboscopic"]["position"], **POINTS | {"markersize": 1.2})
+    ax.plot(
+        tree["stroboscopic"]["value"],
+        tree["stroboscopic"]["position"],
+        color=LOOK.ink,
+        linestyle="none",
+        marker=".",
+        markersize=1.2,
+        markeredgewidth=0.0,
+        rasterized=True,
+    )
 
 
 def _exponents(ax: Any, tree: Any) -> None:
     """Chaos in blue, undecided motions as open red marks; settled motions have no mark."""
     draw_bands(ax, tree)
-    ax.axhline(0.0, color=FAINT, lw=0.6, zorder=1)
+    ax.axhline(0.0, color=LOOK.faint, lw=0.6, zorder=1)
     table = tree["exponents"]
     for kind, colour, face, label in (
-        (Ending.CHAOTIC, STABLE, STABLE, "chaotic"),
-        (Ending.UNDECIDED, UNSTABLE, "white", "undecided"),
+        (Ending.CHAOTIC, LOOK.stable, LOOK.stable, "chaotic"),
+        (Ending.UNDECIDED, LOOK.unstable, "white", "undecided"),
     ):
         here = table["verdict"].values == kind
         ax.errorbar(

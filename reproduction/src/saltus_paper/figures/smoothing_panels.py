@@ -7,18 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.plots import (
-    DOUBLE_COLUMN,
-    FAINT,
-    INK,
-    STABLE,
-    STABLE_LINE,
-    UNSTABLE_LINE,
-    new_figure,
-    panel_label,
-    smooth_lines,
-    styled,
-)
+from saltus.plots import LOOK, new_figure, panel_label, smooth_lines, styled
 
 BOUNDS = (0.2, 1.0)  # Omega
 REGULAR = 0.6  # Omega of an orbit without a special point nearby
@@ -32,7 +21,7 @@ WINDOW = (0.2655, 0.2875)  # Omega of the superharmonic resonance that is drawn,
 @styled
 def draw(data: Any) -> Any:
     """(a) the spectrum, (b) its superharmonic resonance, (c) errors over B, (d) errors over the work."""
-    figure = new_figure(DOUBLE_COLUMN, 150.0)
+    figure = new_figure(LOOK.double_column, 150.0)
     axes = figure.subplots(2, 2)
     _draw_branches(axes[0, 0], data, SHOWN[:1])
     _draw_branches(axes[0, 1], data, SHOWN)
@@ -61,7 +50,8 @@ def _draw_branches(ax: Any, data: Any, shown: tuple[float, ...]) -> None:
         here = exact["kind"].values == kind
         ax.plot(
             exact["special_parameter"].values[here], exact["special_amplitude"].values[here],
-            linestyle="none", marker=marker, markersize=4.0, markerfacecolor="white", color=INK, zorder=5, label=KIND_NAMES[kind],
+            linestyle="none", marker=marker, markersize=4.0, markerfacecolor="white", color=LOOK.ink, zorder=5,
+            label=KIND_NAMES[kind],
         )  # fmt: skip
     ax.set_xlabel(r"frequency $\Omega$")
     ax.set_ylabel(r"$\max|\theta|$ (rad)")
@@ -70,7 +60,7 @@ def _draw_branches(ax: Any, data: Any, shown: tuple[float, ...]) -> None:
 
 def _draw_branch(ax: Any, branch: Any, look: dict[str, Any], label: str | None) -> None:
     for i, part in enumerate(smooth_lines(branch)):
-        kind = STABLE_LINE if part.stable else UNSTABLE_LINE
+        kind = LOOK.stable_line if part.stable else LOOK.unstable_line
         ax.plot(*part.places.T, **kind | look, label=None if i else label)
 
 
@@ -79,7 +69,7 @@ def _draw_settled(ax: Any, confirmed: Any) -> None:
     here = confirmed["sharpness"].values == SHOWN[0]
     ax.plot(
         confirmed["frequency"].values[here], confirmed["settled"].values[here],
-        linestyle="none", marker="o", markersize=2.6, color=STABLE, zorder=4, label=r"exact motion from there",
+        linestyle="none", marker="o", markersize=2.6, color=LOOK.stable, zorder=4, label=r"exact motion from there",
     )  # fmt: skip
     ax.legend(loc="upper left", ncols=2, columnspacing=1.0)
 
@@ -103,8 +93,10 @@ def _draw_errors(ax: Any, features: Any) -> None:
             label=name,
         )
     guide = np.array([40.0, 1000.0])
-    ax.loglog(guide, 3e-4 / guide**2, color=FAINT, linewidth=0.8, zorder=1)
-    ax.annotate(r"$\mathcal{B}^{-2}$", (guide[0], 3e-4 / guide[0] ** 2), textcoords="offset points", xytext=(-14, -2), color=INK)
+    ax.loglog(guide, 3e-4 / guide**2, color=LOOK.faint, linewidth=0.8, zorder=1)
+    ax.annotate(
+        r"$\mathcal{B}^{-2}$", (guide[0], 3e-4 / guide[0] ** 2), textcoords="offset points", xytext=(-14, -2), color=LOOK.ink
+    )
     ax.set_xlabel(r"$\mathcal{B}$")
     ax.set_ylabel("distance from the exact value")
     ax.set_ylim(1e-15, 0.1)
@@ -118,7 +110,7 @@ def _draw_work(ax: Any, work: Any) -> None:
     ):
         exact = math.isinf(sharpness)
         label = "exact, impact by impact" if exact else rf"$\mathcal{{B}}={sharpness:g}$"
-        colour = STABLE if exact else SHADES[sharpness]
+        colour = LOOK.stable if exact else SHADES[sharpness]
         ax.loglog(evaluations, error, "o-", color=colour, markersize=3.0, linewidth=1.4 if exact else 0.9, label=label)
     ax.set_xlabel("evaluations of the right-hand side in 20 periods")
     ax.set_ylabel("error of the last state")

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from saltus import branches_of
-from saltus.plots import INK, draw_response, smooth_lines
+from saltus.plots import LOOK, draw_response, smooth_lines
 
 PLACES = 24  # the number of places along each side of the axes that are tried for an inset
 MARGIN = 0.05  # the ticks of an inset take this share of the axes
@@ -29,7 +29,7 @@ def draw_zoom(
     inset.tick_params(labelsize=6, length=2, pad=1.5)
     inset.locator_params(nbins=3)
     draw_response(inset, spectrum, quantity, scale, WEIGHT)
-    box = ax.indicate_inset_zoom(inset, edgecolor=INK, linewidth=0.4, alpha=1.0)
+    box = ax.indicate_inset_zoom(inset, edgecolor=LOOK.ink, linewidth=0.4, alpha=1.0)
     for connector in box.connectors:
         connector.set_visible(False)  # they would cross the curves
     return inset
@@ -49,7 +49,7 @@ def draw_beside(
     ax.locator_params(axis="x", nbins=4)
     draw_response(ax, spectrum, quantity, scale, WEIGHT)
     box = main.indicate_inset(
-        bounds=(window[0], window[2], window[1] - window[0], window[3] - window[2]), edgecolor=INK, alpha=1.0
+        bounds=(window[0], window[2], window[1] - window[0], window[3] - window[2]), edgecolor=LOOK.ink, alpha=1.0
     )
     box.set_linewidth(0.5)
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from saltus import branch_of, branches_of
-from saltus.plots import BranchLine, branch_lines, smooth_lines
+from saltus.plots import branch_lines, smooth_lines
 
 PROMINENT = 0.05  # least height of a resonance above the minima beside it, as a share of the highest amplitude
 FREE_ENDS = {"closed", "bound"}  # the end reasons of a branch that is connected to no other
@@ -69,7 +69,7 @@ def amplitudes_at(branch: Any, value: float, stable: bool | None = None) -> np.n
     return passing(steps_of(smooth_lines(branch), stable), value)
 
 
-def steps_of(lines: Iterable[BranchLine], stable: bool | None = None) -> np.ndarray:
+def steps_of(lines: Iterable[Any], stable: bool | None = None) -> np.ndarray:
     """The steps of lines, as `smooth_lines` gives them, from place to place: parameter and amplitude at both ends, (n, 4)."""
     chosen = [line.places for line in lines if stable in (None, line.stable)]
     return np.concatenate([np.empty((0, 4)), *(np.hstack([places[:-1], places[1:]]) for places in chosen)])
