@@ -17,7 +17,7 @@ GLOSSARY = SOURCE.parents[1] / "docs" / "glossary.md"
 PLAIN = """
     advanced approach array ask backward belt box buffer case chain check common compiler computation condition conditioned
     confirmation declared detail difference energy extreme factor failure file find four gain geometry group growth half
-    helper inner interrupted judged line linear linked linking loaded location loop mask matching natural neighbour numbered
+    helper inner interrupted judged line linear linked linking loaded location look loop mask matching natural neighbour numbered
     opening option origin oscillator outcome peak physical placement pointed raised read reading restart row run sampled searched
     sequence singular size slow solver source spacing stretch stretched stretching table three timed type until vibration watch
     whole
