@@ -48,7 +48,7 @@ MAY_IMPORT = {
     "studies": {"systems", "theory", "flow", "continuation", "orbits", "attractors", "sweep"},
     "plots": set(),
     "config": {"systems", "flow", "attractors", "sweep", "studies"},
-    "web": {"systems", "taylor", "flow", "config"},
+    "web": {"systems", "taylor", "flow", "orbits", "config"},
     "cli": {"systems", "theory", "flow", "taylor", "orbits", "attractors", "sweep", "studies", "plots", "config"},
 }
 TEXTS = {f"saltus.taylor.{name}" for name in ("lane_memory", "lane_vectors", "load_tables", "vectors")}  # of the lanes

@@ -62,7 +62,7 @@ export function startEntries(description, first, periodic) {
     const [x, v] = [first.start[name] ?? 0, first.start[velocity] ?? 0];
     return [
       { path: `start.${name}`, unit, value: x, low: -reach(x), high: reach(x), angle, symbol: name },
-      { path: `start.${velocity}`, unit: "1", value: v, low: -reach(v), high: reach(v), symbol: velocity },
+      { path: `start.${velocity}`, unit: "1", value: v, low: -reach(v), high: reach(v), symbol: `${name}_velocity` },
     ];
   });
   const time = { path: "start.time", unit: "1", value: first.start.time ?? 0, low: 0, high: 2 * Math.PI, symbol: "tau" };

@@ -141,7 +141,7 @@ export function basinsView(session, basins, startAt) {
   let image = null;
   return {
     id: "basins", title: "Basins of attraction", instructions: "A click starts a motion there.",
-    axes: () => ({ x: { name: axisName(coordinate().name, coordinate().unit) }, y: { name: axisName(coordinate().velocity, coordinate().unit) } }),
+    axes: () => ({ x: { name: axisName(coordinate().name, coordinate().unit) }, y: { name: axisName(`${coordinate().name}_velocity`, coordinate().unit) } }),
     bounds: () => (basins.labels.length ? /** @type {any} */ (basins.window) : null),
     empty: () => (session.period ? "Press “Compute basins”: every cell is a motion of its own." : "Basins need a load that repeats itself."),
     paint: (painter) => {

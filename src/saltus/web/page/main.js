@@ -8,12 +8,13 @@ import { Transport, button } from "./transport.js";
 import { numberGroup } from "./controls.js";
 import { energyView, phasePlane, stroboscopic, timeHistory } from "./views.js";
 import { validityNow, validityOfAll } from "./validity.js";
-import { linkOf, stateOf } from "./link.js";
+import { stateOf } from "./link.js";
+import { Address } from "./address.js";
 import { asCsv, asPng, asPython, asSvg, asToml, save } from "./exports.js";
 import { Sweep } from "./sweep.js";
 import { BASIN_GRID, Basins } from "./basins.js";
 import { basinsLegend, basinsView, sweepControls, sweepSaid, sweepView } from "./laboratory.js";
-import { Choice, ofThisSystem, orbitSaid, paintBeneath, resultView } from "./results_view.js";
+import { Choice, differingSaid, ofThisSystem, orbitSaid, paintBeneath, resultView } from "./results_view.js";
 import { currentPalette } from "./palette.js";
 import { entriesOf, firstState, isPeriodic, spaced, startEntries, tamed } from "./description.js";
 
@@ -44,9 +45,7 @@ export class Page {
     this.plots = [];
     /** @type {import("./controls.js").NumberField[]} */
     this.fields = [];
-    /** @type {ReturnType<typeof setTimeout>|undefined} */
-    this.linking = undefined;
-    this.written = "";
+    this.address = new Address(this.store, this.first, description, (found) => this.linked(found));
     const { own, refused } = ofThisSystem(description.results ?? [], description.digest);
     this.results = own;
     this.session.compute();
@@ -75,7 +74,7 @@ export class Page {
     const theme = /** @type {HTMLSelectElement} */ (at("theme"));
     theme.value = store.state.theme;
     theme.addEventListener("change", () => store.set({ theme: /** @type {any} */ (theme.value) }));
-    at("copy-link").addEventListener("click", () => this.copyLink());
+    at("copy-link").addEventListener("click", async () => this.notice(await this.address.copy()));
     at("save-toml").addEventListener("click", () => save("study.toml", asToml(description, store.state)));
     at("save-python").addEventListener("click", () => save("study.py", asPython(description, store.state)));
     at("reset-all").addEventListener("click", () => this.replaceState({ ...this.first, theme: store.state.theme, degrees: store.state.degrees }));
@@ -158,7 +157,7 @@ export class Page {
     const show = (/** @type {number} */ time) => this.transport.to(time);
     const beneath = (/** @type {any} */ painter) => {
       const chosen = /** @type {any} */ (session.coordinates[this.store.state.coordinate]);
-      paintBeneath(painter, this.results, [chosen.name, chosen.velocity]);
+      paintBeneath(painter, this.results, [chosen.name, chosen.velocity], this.store.state.values);
     };
     this.addPlot(phasePlane(session, (x, y) => this.startAt(x, y), beneath));
     this.addPlot(timeHistory(session, show));
@@ -262,6 +261,8 @@ export class Page {
   saySelected() {
     const { selected } = this.store.state;
     const result = selected && this.results[selected.result];
+    const shown = this.results[this.shownResult ?? -1];
+    at("differing").textContent = shown ? differingSaid(shown, this.store.state.values) : "";
     at("orbit").textContent = selected && result ? orbitSaid(result, selected.branch, selected.point) : "";
   }
 
@@ -285,9 +286,8 @@ export class Page {
     store.on(["degrees", "ranges"], () => this.showFields());
     store.on(["selected"], () => this.saySelected());
     store.on(["theme"], () => this.applyTheme());
-    store.on(["values", "start", "periods", "cursor", "windows", "coordinate", "degrees", "ranges", "selected", "theme", "sweep", "speed"], () => this.linkLater());
+    store.on(["values", "start", "periods", "cursor", "windows", "coordinate", "degrees", "ranges", "selected", "theme", "sweep", "speed"], () => this.address.later());
     addEventListener("resize", () => frame.before("views", () => this.drawAll()));
-    addEventListener("hashchange", () => this.hashChanged());
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.drawAll());
     document.addEventListener("keydown", (event) => this.key(event));
   }
@@ -302,6 +302,7 @@ export class Page {
       if (inside !== cursor) this.store.set({ cursor: inside });
     }
     this.showFields();
+    this.saySelected();
     this.drawAll();
   }
 
@@ -345,36 +346,8 @@ export class Page {
     this.frame.before("views", () => this.drawAll());
   }
 
-  linkLater() {
-    clearTimeout(this.linking);
-    this.linking = setTimeout(() => this.writeLink(), 300);
-  }
-
-  writeLink() {
-    const link = linkOf(this.store.state, this.first, this.description);
-    this.written = link;
-    try {
-      history.replaceState(null, "", link ? `#${link}` : "#");
-    } catch {
-      // A browser may refuse an address of its own making in a sandboxed frame; the page works without.
-    }
-    return link;
-  }
-
-  async copyLink() {
-    this.writeLink();
-    try {
-      await navigator.clipboard.writeText(location.href);
-      this.notice("The link is copied.");
-    } catch {
-      this.notice(`The link is in the address bar.`);
-    }
-  }
-
-  hashChanged() {
-    const link = location.hash.slice(1);
-    if (link === this.written) return;
-    const found = stateOf(link, this.first, this.description);
+  /** A link was opened on the page. @param {{state: State}|{refusal: string}} found */
+  linked(found) {
     if ("refusal" in found) this.notice(found.refusal);
     else this.replaceState(tamed(found.state, this.description));
   }

@@ -196,6 +196,8 @@ export class Painter {
     this.width = width;
     this.height = height;
     this.names = axes;
+    /** Whether what is drawn is of other numbers than the page has. */
+    this.fade = false;
   }
 
   /** @param {number} value */

@@ -20,6 +20,19 @@ export function ofThisSystem(results, digest) {
   return { own, refused: refused.map(({ title }) => `${title} is a result of another system and is not shown.`) };
 }
 
+/** The numbers of a result that are not those of the page, but for the parameters along its axes. @param {ResultEntry} result @param {Record<string, number>} values */
+export function differing(result, values) {
+  const along = [result.path, ...(result.paths ?? [])];
+  return Object.entries(result.values ?? {}).filter(([path, value]) => !along.includes(path) && path in values && values[path] !== value);
+}
+
+/** What is said where a result is of other numbers than the page has now. @param {ResultEntry} result @param {Record<string, number>} values */
+export function differingSaid(result, values) {
+  const other = differing(result, values);
+  if (!other.length) return "";
+  return `Computed for ${other.map(([path, value]) => `${parameterName(path)} = ${allDigits(value)}`).join(", ")}; a click sets these numbers.`;
+}
+
 /** A parameter's axis. @param {string} path */
 function parameterAxis(path) {
   const symbol = parameterSymbol(path);
@@ -41,7 +54,10 @@ export function resultView(session, shown, choice) {
     axes: () => of(axesOf) ?? { x: { name: [""] }, y: { name: [""] } },
     bounds: () => of(boundsOf),
     empty: () => "There is no result to show.",
-    paint: (painter) => of((result) => (result.kind === "diagram" ? paintDiagram(painter, result) : paintChart(painter, result))),
+    paint: (painter) => of((result) => {
+      painter.fade = differing(result, session.store.state.values).length > 0;
+      return result.kind === "diagram" ? paintDiagram(painter, result) : paintChart(painter, result);
+    }),
     over: (painter) => of((result) => paintChosen(painter, result, session)),
     act: (x, y, plot) => of((result) => (result.kind === "diagram" ? choice.nearest(result, x, y, plot) : choice.cell(result, x, y))),
     read: (x, y, plot) => of((result) => (result.kind === "diagram" ? readDiagram(result, x, y, plot) : readChart(result, x, y))),
@@ -77,7 +93,7 @@ function paintDiagram(painter, result) {
   if (result.dots) painter.dots(result.dots.parameter, result.dots.amplitude, palette.separatrix, 1.5);
   for (const branch of result.branches ?? []) {
     for (const [from, to] of runs(branch.stable)) {
-      painter.curve(branch.parameter.slice(from, to + 1), branch.amplitude.slice(from, to + 1), branchLine(palette, Boolean(branch.stable[from])));
+      painter.curve(branch.parameter.slice(from, to + 1), branch.amplitude.slice(from, to + 1), { ...branchLine(palette, Boolean(branch.stable[from])), alpha: painter.fade ? 0.35 : 1 });
     }
   }
   for (const { kind, parameter, amplitude } of result.special ?? []) {
@@ -100,7 +116,7 @@ export function runs(stable) {
 /** @param {Painter} painter @param {ResultEntry} result */
 function paintChart(painter, result) {
   const [xs, ys, cells] = [result.x ?? [], result.y ?? [], result.cells ?? []];
-  const most = Math.max(1e-300, ...cells.flat().map((value) => value ?? 0));
+  const most = cells.flat().reduce((/** @type {number} */ high, value) => Math.max(high, value ?? 0), 1e-300);
   const { ctx } = painter;
   xs.forEach((_, i) => {
     const [left, right] = edges(xs, i);
@@ -108,10 +124,12 @@ function paintChart(painter, result) {
       const value = cells[i]?.[k];
       if (value == null) return;
       const [low, high] = edges(ys, k);
+      ctx.globalAlpha = painter.fade ? 0.35 : 1;
       ctx.fillStyle = shade(value / most);
       ctx.fillRect(painter.x(left), painter.y(high), painter.x(right) - painter.x(left) + 0.6, painter.y(low) - painter.y(high) + 0.6);
     });
   });
+  ctx.globalAlpha = 1;
   for (const { stable, points } of result.curves ?? []) {
     painter.curve(points.map((p) => p[0] ?? NaN), points.map((p) => p[1] ?? NaN), { ...branchLine(painter.palette, stable), width: 1.2 });
   }
@@ -239,8 +257,14 @@ export class Choice {
     const found = result.branches?.[branch];
     if (!found || !result.path) return;
     this.session.store.set({ selected: { result: this.index(), branch, point } });
-    const numbers = { [result.path]: found.parameter[point] ?? NaN };
+    const numbers = { ...this.ownNumbers(result), [result.path]: found.parameter[point] ?? NaN };
     this.show(numbers, this.startFrom(found.start[point], found.time?.[point] ?? 0), found.period[point] ?? 1);
+  }
+
+  /** The numbers of a result's system that the page has. @param {ResultEntry} result */
+  ownNumbers(result) {
+    const { values } = this.session.store.state;
+    return Object.fromEntries(Object.entries(result.values ?? {}).filter(([path]) => path in values));
   }
 
   /** @param {number[]|undefined|null} state @param {number} time */
@@ -261,7 +285,7 @@ export class Choice {
     const cell = cellAt(result, x, y);
     const [first, second] = result.paths ?? [];
     if (!cell || first === undefined || second === undefined) return;
-    const numbers = { [first]: result.x?.[cell.i] ?? NaN, [second]: result.y?.[cell.k] ?? NaN };
+    const numbers = { ...this.ownNumbers(result), [first]: result.x?.[cell.i] ?? NaN, [second]: result.y?.[cell.k] ?? NaN };
     this.show(numbers, this.startFrom(result.starts?.[cell.i]?.[cell.k], 0), null);
   }
 
@@ -276,9 +300,10 @@ export class Choice {
   }
 }
 
-/** Basins and curves of Python beneath the phase plane. @param {Painter} painter @param {ResultEntry[]} results @param {string[]} plane */
-export function paintBeneath(painter, results, plane) {
+/** Basins and curves of Python beneath the phase plane. @param {Painter} painter @param {ResultEntry[]} results @param {string[]} plane @param {Record<string, number>} values */
+export function paintBeneath(painter, results, plane, values) {
   for (const result of results) {
+    if (differing(result, values).length) continue;
     if (result.plane && result.plane.join() !== plane.join()) continue;
     if (result.kind === "basins") paintBasins(painter, result);
     if (result.kind === "curves" || result.kind === "basins") {

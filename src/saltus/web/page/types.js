@@ -48,6 +48,7 @@
  * @property {string} kind  "diagram", "chart", "basins" or "curves"
  * @property {string} title
  * @property {string} digest
+ * @property {Numbers} [values]  All numbers of the system of which it is.
  * @property {string} [path]
  * @property {string} [quantity]
  * @property {ResultBranch[]} [branches]

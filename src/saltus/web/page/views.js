@@ -47,7 +47,7 @@ export function phasePlane(session, startAt, beneath) {
     instructions: "A click, or Enter at the cursor, starts a motion there.",
     axes: () => {
       const coordinate = coordinateOf(session);
-      return { x: { name: axisName(coordinate.name, unitOf(coordinate)) }, y: { name: axisName(coordinate.velocity, unitOf(coordinate)) } };
+      return { x: { name: axisName(coordinate.name, unitOf(coordinate)) }, y: { name: axisName(`${coordinate.name}_velocity`, unitOf(coordinate)) } };
     },
     bounds: () => {
       const [xs, ys] = columns();
@@ -130,15 +130,16 @@ function nearest(session, plot, x, y) {
 /** @param {Session} session @param {number} time */
 function stateRead(session, time) {
   const state = session.stateAt(time);
-  const names = session.coordinates.flatMap(({ name }) => name).concat(session.coordinates.map(({ velocity }) => velocity));
+  const coordinates = session.coordinates.map(({ name }) => name);
+  const names = [...coordinates, ...coordinates.map((name) => `${name}_velocity`)];
   const parts = names.map((name, i) => `${asText(symbolOf(name))} = ${allDigits(state?.[i] ?? NaN)}`);
   return `τ = ${allDigits(time)}, ${parts.join(", ")}`;
 }
 
 /** @param {Session} session @param {number} x @param {number} y */
 function coordinatesRead(session, x, y) {
-  const { name, velocity } = coordinateOf(session);
-  return `${asText(symbolOf(name))} = ${shortly(x)}, ${asText(symbolOf(velocity))} = ${shortly(y)}`;
+  const { name } = coordinateOf(session);
+  return `${asText(symbolOf(name))} = ${shortly(x)}, ${asText(symbolOf(`${name}_velocity`))} = ${shortly(y)}`;
 }
 
 /** The time history of the coordinates. @param {Session} session @param {(time: number) => void} show @returns {View} */
@@ -223,7 +224,7 @@ export function stroboscopic(session, show) {
     id: "section", title: "Stroboscopic section", instructions: "A click on a point shows that time.",
     axes: () => {
       const c = coordinateOf(session);
-      return { x: { name: axisName(c.name, unitOf(c)) }, y: { name: axisName(c.velocity, unitOf(c)) } };
+      return { x: { name: axisName(c.name, unitOf(c)) }, y: { name: axisName(`${c.name}_velocity`, unitOf(c)) } };
     },
     bounds: () => {
       const found = points();
