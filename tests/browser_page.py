@@ -70,8 +70,12 @@ class BrowserPage:
     def open(self, path: Path, width: int, height: int = 800) -> None:
         """Load a file into a window of this size, in pixels."""
         self("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600)
+        self.go(path.as_uri())
+
+    def go(self, address: str) -> None:
+        """Load an address into the window as it is."""
         self._loaded = False
-        self("Page.navigate", url=path.as_uri())
+        self("Page.navigate", url=address)
         while not self._loaded:
             self._receive()
 

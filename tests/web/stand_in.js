@@ -1,9 +1,9 @@
 /**
  * A plain integrator behind the interface of `engine.js`, for tests of the page alone: Runge-Kutta steps of one contact and
- * cubic interpolation. It is no engine: it is exact to about 1e-6, and knows three models.
+ * cubic interpolation. It is no engine: it is exact to about 1e-5, and knows three models.
  */
 
-const STEPS = 400; // in a unit of time divided by ten
+const STEPS = 100; // in a unit of time divided by ten
 
 const MODELS = {
   WallOscillator: {
@@ -63,7 +63,7 @@ function simulate(model, description, system, start, duration) {
   const f = (tt, xx, ww) => model.acceleration(values, tt, xx, ww, side, load);
   const steps = [];
   const events = [];
-  const h = Math.min(10 / STEPS, (system.period ?? 6) / 200);
+  const h = Math.min(10 / STEPS, (system.period ?? 6) / 80);
   let stop = wall.bounce && x > wall.at ? "outside" : "horizon";
   const gap = (xx) => (wall.bounce ? wall.at - xx : side * (xx - wall.at));
   while (stop === "horizon" && t < first + duration - 1e-12 && steps.length < 400000) {

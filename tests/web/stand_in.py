@@ -52,7 +52,7 @@ def wall() -> dict[str, Any]:
         "start": {"time": 0.0, "x": 0.0, "x_velocity": 0.0},
         "study": {
             "system": {"model": model, "load": load, "impact": {"type": "VelocityReduction", "e": 0.8}},
-            "simulate": {"x": 0.0, "periods": 30},
+            "simulate": {"x": 0.0, "periods": 12},
         },
         "digest": "stand-in-wall",
         "results": [],

@@ -61,7 +61,7 @@ def _one(data: Any, system: System) -> dict[str, Any]:
     own = _system_of(data.attrs)
     check_provenance(data.attrs, system, f"the {kind.replace('_', ' ')}")
     if digest(own) != digest(system):
-        raise ParameterError(f"the {kind.replace('_', ' ')} is of another system: its model, loads or impact law differ", "results")
+        raise ParameterError(f"the {kind.replace('_', ' ')} is of another system: its loads or impact law differ", "results")
     title = kind.replace("_", " ").capitalize()
     common = {"title": str(data.attrs.get("title", title)), "digest": digest(system), "values": dict(numbers(own))}
     return common | READERS[kind](data)
@@ -80,7 +80,7 @@ def _diagram(tree: Any) -> dict[str, Any]:
         branches.append(_branch(branch))
         special += list(_special(branch))
     dots = tree["attractors"].dataset
-    bands = tree["bands"].dataset if "bands" in tree.children else None
+    bands = [tree["bands"].dataset[name].values for name in ("low", "high")] if "bands" in tree.children else [[], []]
     return {
         "kind": "diagram",
         "path": str(tree.attrs["path"]),
@@ -88,13 +88,13 @@ def _diagram(tree: Any) -> dict[str, Any]:
         "branches": branches,
         "special": special,
         "dots": {name: _listed(dots[name].values) for name in ("parameter", "amplitude")},
-        "bands": [] if bands is None else [{"low": float(a), "high": float(b)} for a, b in zip(bands.low, bands.high, strict=True)],
+        "bands": [{"low": float(a), "high": float(b)} for a, b in zip(*bands, strict=True)],
     }
 
 
 def _single_branch(branch: Any) -> dict[str, Any]:
-    path = str(branch.attrs["path"])
-    return {"kind": "diagram", "path": path, "quantity": "amplitude", "branches": [_branch(branch)], "special": list(_special(branch))}
+    common = {"kind": "diagram", "path": str(branch.attrs["path"]), "quantity": "amplitude"}
+    return common | {"branches": [_branch(branch)], "special": list(_special(branch))}
 
 
 def _branch(branch: Any) -> dict[str, Any]:
