@@ -53,11 +53,14 @@ from .orbits import mean_dissipated_power as mean_dissipated_power
 from .orbits import search_orbits as search_orbits
 from .orbits import switch_branch as switch_branch
 from .orbits import transmissibility as transmissibility
+from .plots import animate as animate
 from .plots import plot as plot
 from .progress import show_progress as show_progress
 from .studies import bifurcation_diagram as bifurcation_diagram
 from .studies import chaotic_bands as chaotic_bands
+from .studies import fragility as fragility
 from .studies import frequency_sweep as frequency_sweep
+from .studies import overturning_spectrum as overturning_spectrum
 from .studies import phase_portrait as phase_portrait
 from .studies import response_spectrum as response_spectrum
 from .studies import stability_chart as stability_chart

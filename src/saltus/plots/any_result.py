@@ -14,6 +14,7 @@ from saltus.plots.chart import draw_stability_chart
 from saltus.plots.conventions import LOOK, axes_or_new, figure_of, style
 from saltus.plots.curves import draw_attractors_along, draw_backbone, draw_branch, draw_cascade, draw_search, draw_special_curve
 from saltus.plots.motion import draw_ensemble, draw_motion, draw_sensitivities, draw_sweep
+from saltus.plots.overturning import draw_fragility, draw_overturning
 from saltus.plots.plane import draw_manifold, draw_plane, draw_separatrix
 from saltus.plots.response import draw_diagram
 
@@ -28,12 +29,14 @@ DRAWINGS: dict[str, Callable[..., Any]] = {
     "chaotic_bands": draw_chaotic_bands,
     "ensemble": draw_ensemble,
     "exponents": draw_exponents,
+    "fragility": draw_fragility,
     "free_orbit": draw_motion,
     "frequency_sweep": draw_sweep,
     "lyapunov_many": draw_exponents_along,
     "manifold": draw_manifold,
     "motion": draw_motion,
     "orbits": draw_search,
+    "overturning_spectrum": draw_overturning,
     "periodic_orbit": draw_motion,
     "phase_portrait": draw_plane,
     "response_spectrum": draw_diagram,

@@ -7,5 +7,7 @@ from .chart.chart_study import wrong_cells as wrong_cells
 from .diagram.chaos_search import chaotic_bands as chaotic_bands
 from .diagram.diagram_study import bifurcation_diagram as bifurcation_diagram
 from .diagram.diagram_study import response_spectrum as response_spectrum
+from .overturning import fragility as fragility
+from .overturning import overturning_spectrum as overturning_spectrum
 from .portrait import phase_portrait as phase_portrait
 from .swept_parameter import frequency_sweep as frequency_sweep

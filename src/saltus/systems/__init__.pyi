@@ -10,6 +10,8 @@ from .contact_model import mass_and_force as mass_and_force
 from .contact_model import normal_forces as normal_forces
 from .contact_model import reactions as reactions
 from .contact_model import stick_margins as stick_margins
+from .drawings import Shape as Shape
+from .drawings import drawing_of as drawing_of
 from .impact_laws import EnergyRestitution as EnergyRestitution
 from .impact_laws import ImpactLaw as ImpactLaw
 from .impact_laws import InelasticImpact as InelasticImpact

@@ -240,7 +240,7 @@ class PhysicalBlock(Physical):
     >>> pulse = saltus.HalfSine(amplitude=3.0, frequency=2 * np.pi, quantity="acceleration")  # m/s^2, rad/s
     >>> system = block.system(saltus.Load(ground_horizontal=pulse))  # with Housner's loss at impacts
     >>> motion = saltus.simulate(system, theta=0.0, duration=10.0 * block.frequency)  # 10 s
-    >>> str(motion.stop), round(motion.impacts.time[0] / block.frequency, 4)
+    >>> str(motion.stop), round(float(motion.impacts.time[0]) / block.frequency, 4)
     ('rest', 0.8)
     """
 

@@ -1,0 +1,203 @@
+"""Motions as films: the mechanism that moves, beside its phase portrait that grows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import animation
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Polygon
+
+from saltus.checks import check_number
+from saltus.errors import ParameterError, shown
+from saltus.plots.conventions import (
+    DOUBLE_COLUMN,
+    FAINT,
+    INK,
+    LIMIT,
+    STABLE,
+    UNSTABLE,
+    new_figure,
+    style,
+    symbol,
+    unit_in_brackets,
+)
+from saltus.plots.motion import LINES, PAIRS, arcs, coordinates
+from saltus.progress import Progress, silent
+from saltus.systems import drawing_of
+
+RESOLUTION_OF_FILMS = 110  # dots per inch: 820 x 330 points, which a page shows without scaling
+LOOKS: dict[str, dict[str, Any]] = {
+    "ground": {"color": INK, "lw": 1.2},
+    "wall": {"color": INK, "lw": 2.4},
+    "slider": {"color": INK, "lw": 1.4},
+    "bar": {"color": "#5f6b76", "lw": 2.4},
+    "spring": {"color": LIMIT, "lw": 1.0},
+    "body": {"facecolor": "#d9e4f1", "edgecolor": STABLE, "lw": 1.4},
+    "mass": {"facecolor": INK, "edgecolor": INK, "lw": 0.8},
+    "hinge": {"facecolor": "white", "edgecolor": INK, "lw": 0.8},
+}  # by the role of a shape; those with a face are filled
+SUFFIXES = {".gif": "pillow", ".mp4": "ffmpeg", ".html": "html"}
+
+
+def animate(
+    result: Any,
+    path: Path | str | None = None,
+    *,
+    seconds: float = 8.0,
+    fps: float = 25.0,
+    width: float = DOUBLE_COLUMN,
+    progress: Progress = silent,
+) -> Any:
+    """A film of a motion, or of one period of an orbit: the mechanism as it moves, beside its phase portrait.
+
+    The mechanism is that of `saltus.systems.drawing_of`; a model of your own may say how it is drawn.
+
+    Parameters
+    ----------
+    result
+        A `Motion` that was kept densely, or a `PeriodicOrbit` or a `FreeOrbit`.
+    path
+        The file, a GIF (.gif), a page with buttons (.html) or, where ffmpeg is installed, a film (.mp4).
+    seconds
+        How long the film is, in seconds.
+    fps
+        The pictures in a second.
+    width
+        The width of the picture, mm.
+    progress
+        Called from time to time with the fraction done and what is being done.
+
+    Returns
+    -------
+    Path or matplotlib.animation.FuncAnimation
+        The path of the file; without one the animation, whose `to_jshtml()` a notebook shows.
+
+    Raises
+    ------
+    ParameterError
+        A result that does not move, a file of another kind, an MP4 where ffmpeg is missing.
+
+    Examples
+    --------
+    >>> film = saltus.animate(saltus.simulate(system, theta=0.3, periods=2), "cell.gif", seconds=0.4, fps=10)
+    >>> film.name, film.stat().st_size > 1000
+    ('cell.gif', True)
+    """
+    file = None if path is None else Path(path)
+    writer = None if file is None else _writer(file, fps)
+    check_number("seconds", seconds, above=0.0)
+    check_number("fps", fps, above=0.0, at_most=240.0)
+    motion = result.motion() if callable(getattr(result, "motion", None)) else result
+    if not hasattr(motion, "system") or getattr(motion, "dense", None) is None:
+        raise ParameterError(f"result must be a motion that was kept densely, or an orbit, got {shown(result)}", "result")
+    count = max(2, round(seconds * fps))
+    with style():
+        film = _Film(motion, np.linspace(motion.start, motion.time, count), width)
+        made = animation.FuncAnimation(film.figure, film.show, frames=count, interval=1000.0 / fps, blit=False)
+        if file is None or writer is None:
+            return made
+        file.parent.mkdir(parents=True, exist_ok=True)
+
+        def seen(number: int, total: int) -> object:
+            return progress(number / max(total, 1), f"picture {number + 1} of {total}")
+
+        made.save(file, writer=writer, dpi=RESOLUTION_OF_FILMS, progress_callback=seen)
+    progress(1.0, "film")
+    return file
+
+
+def _writer(file: Path, fps: Any) -> Any:
+    """The writer of Matplotlib for a file."""
+    kind = SUFFIXES.get(file.suffix.lower())
+    if kind is None:
+        raise ParameterError(f"a film is a .gif, .html or .mp4, got {file.name!r}", "path")
+    if kind == "ffmpeg" and not animation.FFMpegWriter.isAvailable():
+        raise ParameterError("an MP4 is written by ffmpeg, which is not installed here; write a .gif or .html instead", "path")
+    if kind == "html":
+        return animation.HTMLWriter(fps=fps, embed_frames=True)
+    return animation.PillowWriter(fps=fps) if kind == "pillow" else animation.FFMpegWriter(fps=fps)
+
+
+class _Film:
+    """The figure of a film, and how it shows one of its times."""
+
+    def __init__(self, motion: Any, times: np.ndarray, width: float) -> None:
+        self.motion, self.times = motion, times
+        self.places = np.atleast_2d(motion.at(times)[0])  # (degrees of freedom, n)
+        self.figure = new_figure(width, 0.4 * width)
+        mechanism, portrait = self.figure.subplots(1, 2, width_ratios=(1.2, 1))
+        shapes = [drawing_of(motion.system, place) for place in self.places.T]
+        self.shapes = shapes
+        self.artists = [_artist(mechanism, shape) for shape in shapes[0]]
+        corners = np.concatenate(
+            [shape.points + reach for each in shapes for shape in each for reach in (shape.radius, -shape.radius)]
+        )
+        (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
+        room = 0.04 * max(x1 - x0, y1 - y0)
+        mechanism.set(xlim=(x0 - room, x1 + room), ylim=(y0 - room, y1 + room), aspect="equal")
+        mechanism.axis("off")
+        self.title = mechanism.set_title("", loc="left")
+        self._portrait(portrait)
+
+    def _portrait(self, ax: Axes) -> None:
+        """The whole motion, faint, the part that was shown, and the states at the time that is shown."""
+        data = self.motion.to_xarray()
+        names = coordinates(data)
+        looks = [
+            LINES[i] if len(names) <= len(LINES) else {"color": PAIRS[i // 2 % len(PAIRS)], "ls": ("-", (0, (4, 1.5)))[i % 2]}
+            for i in range(len(names))
+        ]
+        self.lines, self.dots = [], []
+        for name, look in zip(names, looks, strict=True):
+            time, place, velocity = arcs(data, name)
+            ax.plot(place, velocity, color=FAINT, lw=0.7, zorder=1)
+            (line,) = ax.plot([], [], lw=1.0, zorder=2, label=f"${symbol(name)}$", **look)
+            (dot,) = ax.plot([], [], marker="o", ms=5, color=look["color"], ls="none", zorder=3)
+            self.lines.append((line, time, place, velocity))
+            self.dots.append(dot)
+        unit = unit_in_brackets(data[names[0]])
+        if len(names) == 1:
+            ax.set(xlabel=f"${symbol(names[0])}${unit}", ylabel=rf"$\dot{{{symbol(names[0])}}}${unit}")
+        else:
+            ax.set(xlabel=f"coordinates{unit}", ylabel=f"velocities{unit}")
+            if len(names) <= 4:
+                ax.legend(loc="best")
+
+    def show(self, frame: int) -> list[Artist]:
+        """The picture with this number."""
+        time = float(self.times[frame])
+        self.title.set_text(rf"$\tau={time:.2f}$")
+        for artist, shape in zip(self.artists, self.shapes[frame], strict=True):
+            if isinstance(artist, Line2D):
+                artist.set_data(*shape.points.T)
+            elif isinstance(artist, Polygon):
+                artist.set_xy(shape.points)
+            elif isinstance(artist, Circle):
+                artist.center = tuple(shape.points[0])
+        place, velocity = (np.atleast_1d(values) for values in self.motion.at(time))
+        for i, (line, times, places, velocities) in enumerate(self.lines):
+            seen = int(np.searchsorted(times, time, side="right"))
+            line.set_data(np.append(places[:seen], place[i]), np.append(velocities[:seen], velocity[i]))
+            self.dots[i].set_data([place[i]], [velocity[i]])
+        return [*self.artists, *self.dots]
+
+
+def _artist(ax: Axes, shape: Any) -> Artist:
+    """A shape in axes."""
+    look = LOOKS.get(shape.role, {"color": UNSTABLE})
+    if shape.kind == "circle":
+        face = {key: look[key] for key in ("facecolor", "edgecolor", "lw") if key in look}
+        patch: Artist = Circle(tuple(shape.points[0]), shape.radius, zorder=4, **face)
+        ax.add_patch(patch)  # type: ignore[arg-type]
+        return patch
+    if "facecolor" in look:
+        patch = Polygon(shape.points, closed=True, zorder=3, **look)
+        ax.add_patch(patch)
+        return patch
+    (line,) = ax.plot(*shape.points.T, zorder=2, solid_capstyle="round", **look)
+    return line

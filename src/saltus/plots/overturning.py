@@ -1,0 +1,61 @@
+"""Which loads overturn a system: over amplitude and frequency with the exact borders, and as a share of many loads."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from saltus.plots.conventions import DASHES, INK, SINGLE_COLUMN, STABLE, axes_or_new, cell_edges, drawing, legend_of
+
+FILLS = ("white", "#bcd2ea", "#f3c98b", "#c9a0c9")  # stands; overturns at once, after one impact, after more
+IMPACTS = ("without an impact", "after 1 impact", "after {} impacts")
+
+
+@drawing
+def draw_overturning(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * SINGLE_COLUMN) -> Axes:
+    """Draw the map of `overturning_spectrum` in shades, and its borders as lines; returns the axes."""
+    own = ax is None
+    ax = axes_or_new(ax, width, 0.75 * width)
+    impacts, fallen = dataset["impacts"].values, dataset["overturned"].values != 0
+    kinds = np.where(fallen, 1 + np.minimum(impacts, len(FILLS) - 2), 0)
+    edges = cell_edges(dataset["frequency"].values), cell_edges(dataset["amplitude"].values)
+    ax.pcolormesh(*edges, kinds.T, cmap=ListedColormap(FILLS), vmin=-0.5, vmax=len(FILLS) - 0.5, rasterized=True)
+    shown = sorted(set(np.minimum(impacts[fallen], len(FILLS) - 2).tolist()))
+    names = [*IMPACTS[:2], f"after {len(FILLS) - 2} or more impacts"]
+    handles: list[Any] = [Patch(facecolor=FILLS[1 + k], label=f"overturns {names[k]}") for k in shown]
+    counts = dataset["border_impacts"].values
+    for k, count in enumerate(sorted(set(counts.tolist()))):
+        line: dict[str, Any] = {"color": INK, "linestyle": DASHES[min(k, len(DASHES) - 1)], "linewidth": 1.0}
+        for number in sorted(set(dataset["border_number"].values[counts == count].tolist())):
+            part = dataset["border_number"].values == number
+            marker = "." if np.count_nonzero(part) == 1 else ""
+            ax.plot(dataset["border_frequency"].values[part], dataset["border_amplitude"].values[part], marker=marker, **line)
+        handles.append(Line2D([], [], label=f"border {IMPACTS[min(count, 2)].format(count)}", **line))
+    signal = json.loads(dataset.attrs.get("system", "{}")).get("load", {}).get(dataset.attrs["channel"], {})
+    pulse = signal.get("type", "record") if isinstance(signal, dict) else "record"
+    ax.set_xlim(edges[0][0], edges[0][-1])
+    ax.set_ylim(edges[1][0], edges[1][-1])
+    ax.set_xlabel("speed of the record" if pulse == "record" else r"frequency $\omega$ of the pulse")
+    ax.set_ylabel("scale of the record" if pulse == "record" else f"amplitude of the {signal.get('quantity', 'pulse')}")
+    legend_of(ax, own, handles, ncols=2)
+    return ax
+
+
+@drawing
+def draw_fragility(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
+    """Draw the share of the loads that overturn, with its interval, over the scale of `fragility`; returns the axes."""
+    ax = axes_or_new(ax, width, 0.7 * width)
+    scale = dataset["scale"].values
+    ax.fill_between(
+        scale, dataset["lower"].values, dataset["upper"].values, color=STABLE, alpha=0.18, lw=0.0, label="95 % interval"
+    )
+    ax.plot(scale, dataset["share"].values, color=STABLE, lw=1.2, label=f"share of {dataset.sizes['record']} loads")
+    ax.set(xlabel="scale of the loads", ylabel="share that overturns", ylim=(-0.02, 1.02), xlim=(scale[0], scale[-1]))
+    ax.legend(loc="best")
+    return ax

@@ -1,0 +1,238 @@
+"""Drawings: the mechanism of a model in one of its states, as lines and circles in the plane of motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from saltus.checks import check_states
+from saltus.systems.cell_chain import CellChain
+from saltus.systems.metainterface import Metainterface
+from saltus.systems.model import Model
+from saltus.systems.oscillators import BeltOscillator, ImpactPair, TwoStops, WallOscillator
+from saltus.systems.rocking_block import RockingBlock
+from saltus.systems.system import System
+from saltus.systems.two_layer import TwoLayer
+from saltus.systems.unit_cell import CellLayout, UnitCell
+
+BASE = 1.4  # of a cell whose model says nothing of it: the horizontal edges in units of l
+BETWEEN = 0.9  # the space between two cells of a chain, in units of l
+COILS = 6  # of a spring
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A part of a drawing.
+
+    Attributes
+    ----------
+    kind
+        "line", an open or closed line through the points, or "circle", a disc about the one point.
+    points
+        The points, (n, 2).
+    role
+        What it is: "body", "bar", "spring", "slider", "wall", "ground", "mass" or "hinge".
+    radius
+        The radius of a circle.
+
+    Examples
+    --------
+    >>> shapes = saltus.systems.drawing_of(saltus.System(model=saltus.RockingBlock(alpha=0.2)), [0.1])
+    >>> [(shape.kind, shape.role, len(shape.points)) for shape in shapes]
+    [('line', 'ground', 2), ('line', 'body', 5)]
+    """
+
+    kind: str
+    points: np.ndarray
+    role: str
+    radius: float = 0.0
+
+
+def drawing_of(system: System, position: Any) -> tuple[Shape, ...]:
+    """The mechanism of a system with given coordinates: always the same shapes in the same order, wherever they are.
+
+    A model of your own may have a method `drawing(position)` that returns a list of `Shape`; without one, each of its coordinates
+    is drawn as a mass on a line. Angles are drawn as they are, lengths in the unit of the coordinate. The frame is that of the
+    ground.
+
+    Parameters
+    ----------
+    system
+        What is drawn.
+    position
+        The coordinates, (n,).
+
+    Raises
+    ------
+    ParameterError
+        Another number of coordinates than the model has, or one that is not finite.
+
+    Examples
+    --------
+    >>> shapes = saltus.systems.drawing_of(system, [0.3])
+    >>> sum(shape.role == "mass" for shape in shapes)
+    2
+    """
+    model = system.model
+    place = check_states("position", [position], len(model.coordinates))[0]
+    own: Any = getattr(model, "drawing", None)
+    if own is not None:
+        return tuple(own(place))
+    draw = next((draw for kind, draw in DRAWN.items() if isinstance(model, kind)), _masses)
+    return tuple(draw(model, place))
+
+
+def _line(role: str, *points: Any) -> Shape:
+    return Shape("line", np.array(points, dtype=float), role)
+
+
+def _disc(role: str, middle: Any, radius: float) -> Shape:
+    return Shape("circle", np.array([middle], dtype=float), role, radius)
+
+
+def _box(role: str, x: float, y: float, width: float, height: float) -> Shape:
+    """A rectangle about the middle (x, y)."""
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]) * [width / 2, height / 2]
+    return Shape("line", corners + np.array([x, y]), role)
+
+
+def _spring(x: float, y: float, to: float, to_y: float | None = None) -> Shape:
+    """A spring from (x, y) to another place, by default at the same height."""
+    start, end = np.array([x, y]), np.array([to, y if to_y is None else to_y])
+    along, share = end - start, np.concatenate([[0.0], np.linspace(0.15, 0.85, 2 * COILS + 1), [1.0]])
+    sideways = np.concatenate([[0.0, 0.0], np.tile([1.0, -1.0], COILS)[: 2 * COILS - 1], [0.0, 0.0]])
+    length = math.hypot(*along) or 1.0
+    across = np.array([-along[1], along[0]]) / length
+    return Shape("line", start + share[:, None] * along + 0.09 * sideways[:, None] * across, "spring")
+
+
+def _block(model: RockingBlock, place: np.ndarray) -> list[Shape]:
+    """A block with the half diagonal 1; it turns about its right corner for theta > 0, about its left one for theta < 0."""
+    theta, width, height = float(place[0]), math.sin(model.alpha), math.cos(model.alpha)
+    corners = np.array([[-width, 0], [width, 0], [width, 2 * height], [-width, 2 * height], [-width, 0]])
+    pivot = np.array([width if theta >= 0 else -width, 0.0])
+    turn = np.array([[math.cos(theta), math.sin(theta)], [-math.sin(theta), math.cos(theta)]])
+    return [_line("ground", (-1.6, 0), (1.6, 0)), Shape("line", (corners - pivot) @ turn.T + pivot, "body")]
+
+
+def _on_spring(x: float, left: float, y: float = 0.25) -> list[Shape]:
+    """A mass on a spring that is fixed at `left`."""
+    return [_line("wall", (left, 0.0), (left, 0.55)), _spring(left, y, x - 0.2), _box("mass", x - 0.1, y, 0.2, 0.4)]
+
+
+def _wall(model: WallOscillator, place: np.ndarray) -> list[Shape]:
+    """The mass, whose right face is at x, on a spring, and the wall at d."""
+    left, right = min(-2.0, model.wall - 2.0), max(1.5, model.wall + 0.4)
+    return [
+        _line("ground", (left, 0.0), (right, 0.0)),
+        *_on_spring(float(place[0]), left),
+        _line("wall", (model.wall, 0.0), (model.wall, 0.7)),
+    ]
+
+
+def _stops(model: TwoStops, place: np.ndarray) -> list[Shape]:
+    """A mass whose faces meet the stops at d_1 and d_2, on a spring above."""
+    x, left, right, half = float(place[0]), model.left, model.right, 0.2
+    return [
+        _line("ground", (left - half - 0.5, 0.0), (right + half + 0.5, 0.0)),
+        _line("wall", (left - half, 0.0), (left - half, 0.45)),
+        _line("wall", (right + half, 0.0), (right + half, 0.45)),
+        _line("wall", (left - half - 0.5, 0.0), (left - half - 0.5, 0.75)),
+        _spring(left - half - 0.5, 0.6, x),
+        _line("bar", (x, 0.6), (x, 0.4)),
+        _box("mass", x, 0.2, 2 * half, 0.4),
+    ]
+
+
+def _pair(model: ImpactPair, place: np.ndarray) -> list[Shape]:
+    """The case at z on its spring, and the mass in it at the distance x from its middle."""
+    z, x, half = float(place[0]), float(place[1]), model.clearance + 0.2
+    left = -half - 1.8
+    return [
+        _line("ground", (left, 0.0), (half + 1.5, 0.0)),
+        _line("wall", (left, 0.0), (left, 0.7)),
+        _spring(left, 0.35, z - half),
+        _box("body", z, 0.35, 2 * half, 0.7),
+        _disc("mass", (z + x, 0.35), 0.2),
+    ]
+
+
+def _belt(model: BeltOscillator, place: np.ndarray) -> list[Shape]:
+    """A mass on a spring, on a belt between two wheels."""
+    x = float(place[0])
+    wheels = [_disc("hinge", (at, -0.2), 0.2) for at in (-1.4, 1.4)]
+    return [_line("ground", (-1.4, 0.0), (1.4, 0.0)), _line("ground", (-1.4, -0.4), (1.4, -0.4)), *wheels, *_on_spring(x, -2.2)]
+
+
+def cell_shapes(layout: CellLayout, shift: float = 0.0) -> list[Shape]:
+    """The shapes of a unit cell: its supports, bars, sliders, hinges and masses, moved to the right by `shift`."""
+    points = {name: at + np.array([shift, 0.0]) for name, at in layout.points.items()}
+    left, right = points["lower_left"], points["lower_right"]
+    aside = np.array([0.25, 0.0])
+    shapes = [_line("ground", left - aside - [0.0, 0.1], right + aside - [0.0, 0.1])]
+    shapes += [_line("bar", points[first], points[last]) for first, last in layout.bars]
+    shapes += [_line("slider", points[first], points[last]) for first, last in layout.sliders]
+    hinges = [name for name in points if not name.startswith(("slider", "mass"))]
+    shapes += [_disc("hinge", points[name], 0.045) for name in hinges]
+    return shapes + [_disc("mass", points[name], 0.09) for name in ("mass_1", "mass_2")]
+
+
+def _cell_of(beta0: float) -> UnitCell:
+    """The cell of an angle beta0 whose base is of the usual length."""
+    return UnitCell(alpha0=math.atan2(math.sin(beta0), BASE - math.cos(beta0)), beta0=beta0)
+
+
+def _layered(beta0: float, lower: float, upper: float, shift: float = 0.0) -> list[Shape]:
+    """The cell with these openings, which are kept within what the mechanism allows."""
+    cell = _cell_of(beta0)
+    limit = cell.kinematic_limit
+    return cell_shapes(cell.layout(min(max(lower, 0.0), limit), max(min(upper, 0.0), -limit)), shift)
+
+
+def _metainterface(model: Metainterface, place: np.ndarray) -> list[Shape]:
+    """The lower layer is open for theta > 0, the upper one for theta < 0."""
+    return _layered(model.beta0, float(place[0]), float(place[0]))
+
+
+def _two_layers(model: TwoLayer, place: np.ndarray) -> list[Shape]:
+    """Both layers."""
+    return _layered(model.beta0, float(place[0]), float(place[1]))
+
+
+def _chain(model: CellChain, place: np.ndarray) -> list[Shape]:
+    """The cells side by side, with the springs between their masses."""
+    step = BASE + BETWEEN
+    cells = [_layered(model.beta0, float(place[2 * i]), float(place[2 * i + 1]), i * step) for i in range(model.cells)]
+    masses = [[shape.points[0] for shape in cell if shape.role == "mass"] for cell in cells]
+    springs = [_spring(*a, *b) for before, after in pairwise(masses) for a, b in zip(before, after, strict=True)]
+    return [shape for cell in cells for shape in cell] + springs
+
+
+def _masses(model: Model, place: np.ndarray) -> list[Shape]:
+    """A mass on a line of its own for each coordinate, above a mark at 0."""
+    shapes: list[Shape] = []
+    for i, x in enumerate(place.tolist()):
+        y = -0.8 * i
+        shapes += [
+            _line("ground", (-2.0, y), (2.0, y)),
+            _line("wall", (0.0, y - 0.1), (0.0, y)),
+            _box("mass", x, y + 0.2, 0.4, 0.4),
+        ]
+    return shapes
+
+
+DRAWN: dict[type[Model], Callable[[Any, np.ndarray], list[Shape]]] = {
+    RockingBlock: _block,
+    WallOscillator: _wall,
+    TwoStops: _stops,
+    ImpactPair: _pair,
+    BeltOscillator: _belt,
+    CellChain: _chain,
+    TwoLayer: _two_layers,
+    Metainterface: _metainterface,
+}

@@ -1,0 +1,60 @@
+"""Films: a picture for each time, files of the kinds that are asked for, and refusals."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import saltus
+from saltus.errors import ParameterError
+
+plt = pytest.importorskip("matplotlib.pyplot")
+SYSTEM = saltus.System(
+    model=saltus.Metainterface(beta0=1.4, damping=0.1),
+    load=saltus.Load(frequency=1.0, horizontal=saltus.Harmonic(0.5), vertical=-0.5),
+)
+
+
+@pytest.fixture(scope="module")
+def motion():
+    return saltus.simulate(SYSTEM, theta=0.3, periods=1)
+
+
+def test_a_gif_has_a_picture_for_each_time_and_is_not_still(motion, tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    path = saltus.animate(motion, tmp_path / "film.gif", seconds=0.5, fps=8)
+    with image.open(path) as film:
+        assert film.n_frames == 4
+        pictures = []
+        for i in range(4):
+            film.seek(i)
+            pictures.append(np.asarray(film.convert("L"), dtype=float))
+    assert all(np.abs(a - b).max() > 50 for a, b in pairwise(pictures))
+
+
+def test_the_last_picture_shows_the_end_of_the_motion(motion):
+    film = saltus.animate(motion, seconds=1.0, fps=5)
+    film._draw_was_started = True  # it is not shown here
+    shown = film._func(4)
+    dots = [
+        artist for artist in shown if artist.get_zorder() == 3 and hasattr(artist, "get_xdata") and artist.get_marker() == "o"
+    ]
+    assert [(float(dot.get_xdata()[0]), float(dot.get_ydata()[0])) for dot in dots] == [(motion.theta, motion.velocity)]
+
+
+def test_an_orbit_is_shown_for_a_period_as_a_page(tmp_path):
+    orbit = saltus.find_orbit(SYSTEM, theta=0.3)
+    path = saltus.animate(orbit, tmp_path / "orbit.html", seconds=0.3, fps=10)
+    assert path.read_text().count("data:image/png;base64") == 3
+
+
+def test_what_is_no_film_is_refused(motion, tmp_path, monkeypatch):
+    from matplotlib import animation
+
+    monkeypatch.setattr(animation.FFMpegWriter, "isAvailable", classmethod(lambda cls: False))
+    with pytest.raises(ParameterError, match=r"an MP4 is written by ffmpeg, which is not installed here; write a .gif or .html"):
+        saltus.animate(motion, tmp_path / "film.mp4")
+    with pytest.raises(ParameterError, match=r"a film is a .gif, .html or .mp4, got 'film.avi'"):
+        saltus.animate(motion, tmp_path / "film.avi")
+    with pytest.raises(ParameterError, match="result must be a motion that was kept densely"):
+        saltus.animate(saltus.simulate(SYSTEM, theta=0.3, periods=1, dense=False))
