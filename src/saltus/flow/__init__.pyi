@@ -43,13 +43,14 @@ from .motion.events import modes_of as modes_of
 from .motion.motion import Motion as Motion
 from .motion.motion import rate_name as rate_name
 from .motion.motion import state_names as state_names
+from .motion.portable import PortableKernel as PortableKernel
+from .motion.portable import PortableMotion as PortableMotion
 from .motion.sensitivities import Sensitivities as Sensitivities
 from .motion.sensitivities import derivatives_of as derivatives_of
 from .motion.sensitivities import sensitivities as sensitivities
 from .motion.sensitivities import state_rates as state_rates
 from .motion.simulate import MotionRequest as MotionRequest
 from .motion.simulate import simulate as simulate
-from .motion.validity import DenseOutput as DenseOutput
 from .motion.validity import Validity as Validity
 from .one_contact.regularity import ContactRegularity as ContactRegularity
 from .one_contact.regularity import contact_regularity as contact_regularity

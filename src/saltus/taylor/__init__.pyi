@@ -1,5 +1,6 @@
 from .cache import cache_directory as cache_directory
 from .cache import digest as digest
+from .cache import kept_bytes as kept_bytes
 from .cache import source_of as source_of
 from .equations import equations_of as equations_of
 from .equations import structure_key as structure_key
@@ -12,6 +13,7 @@ from .generated import Case as Case
 from .generated import SeriesOf as SeriesOf
 from .generated import WrittenFunction as WrittenFunction
 from .generated import functions_text as functions_text
+from .generated import llvm_text as llvm_text
 from .generated import load_functions as load_functions
 from .graph import RECORD_WIDTH as RECORD_WIDTH
 from .graph import Expr as Expr
@@ -64,6 +66,7 @@ from .numba_types import Pointer as Pointer
 from .numba_types import function_type as function_type
 from .numba_types import written_type as written_type
 from .private_numba import entry_point as entry_point
+from .private_numba import llvm_of as llvm_of
 from .private_numba import pointer as pointer
 from .rules import FUNCTIONS as FUNCTIONS
 from .series import Rows as Rows

@@ -133,6 +133,20 @@ lean_jit = _njit(within=True, **LEAN)
 inline_jit = _njit(within=True, **LEAN, forceinline=True)  # for functions that every step of the lanes calls
 
 
+def llvm_of(function: Any, signature: Any) -> tuple[str, str]:
+    """LLVM's text of a function with all that it calls, without machine code, and the function's name in it.
+
+    For another processor the text is needed as numba writes it, before any optimisation folds the size of this one's pointers
+    into it: so in a process with NUMBA_OPT=0, which must not have compiled anything else before.
+    """
+    dispatcher = jit(function)
+    dispatcher.compile(signature)
+    (result,) = dispatcher.overloads.values()
+    with _private("numba.core.compiler_lock", "global_compiler_lock"):
+        result.library._ensure_finalized()
+    return result.library.get_llvm_str(), result.fndesc.llvm_func_name
+
+
 def name_attributes(kind: type, of: Callable[[Any, str], Any]) -> None:
     """Let values of a type have attributes: `of` gives the type of one by its name, or None."""
 

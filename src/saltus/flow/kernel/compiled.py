@@ -138,7 +138,12 @@ def load_kernel() -> Callable[..., int]:
 
 def kernel_module() -> ModuleType:
     """The module of the scalar kernel."""
-    return load_module("kernel", kernel_text(layout, roots, steps, impacts, kernel, loop))
+    return load_module("kernel", one_contact_text())
+
+
+def one_contact_text() -> str:
+    """The source of the kernel of models with at most one contact."""
+    return kernel_text(layout, roots, steps, impacts, kernel, loop)
 
 
 @cache
@@ -149,6 +154,11 @@ def load_contacts_kernel() -> Callable[..., int]:
 
 def contacts_module() -> ModuleType:
     """The module of the scalar kernel for models with several contacts."""
+    return load_module("contacts", contacts_text())
+
+
+def contacts_text() -> str:
+    """The source of the kernel of models with several contacts."""
     parts = (
         contact_layout,
         complementarity,
@@ -158,7 +168,7 @@ def contacts_module() -> ModuleType:
         closings,
     )
     text = kernel_text(layout, roots, steps, *parts, contacts_kernel, loop)
-    return load_module("contacts", text.replace("(ADVANCE)", "(ADVANCE_CONTACTS)"))
+    return text.replace("(ADVANCE)", "(ADVANCE_CONTACTS)")
 
 
 def kernel_text(*modules: ModuleType) -> str:

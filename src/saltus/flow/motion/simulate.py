@@ -286,30 +286,38 @@ def _why_so_many(system: System, recorder: Recorder) -> str:
 
 def _refuse(system: System, status: int, now: KernelState) -> None:
     """Raise an error, with a sentence, for a status that is no regular end of a motion."""
-    at, velocity = f"at time {now.time:.9g}", now.velocity[0]
+    sentence = refusal(system, status, f"{now.time:.9g}", f"{now.velocity[0]:.6g}")
+    if sentence is not None:
+        raise MotionError(sentence)
+
+
+def refusal(system: System, status: int, time: str, velocity: str) -> str | None:
+    """The sentence for a status that is no regular end of a motion, at a time and with a velocity given as text; else None."""
+    at = f"at time {time}"
     if status in (Status.NOT_UNIQUE, Status.NO_IMPACT) and system.model.holds_coordinates:
         choice = "no choice of closed contacts, and of what sticks, is consistent"
         what = choice if status == Status.NOT_UNIQUE else "the impact law has no solution"
-        raise MotionError(f"{what} {at}: the mass matrix is not positive definite there, or all but singular")
+        return f"{what} {at}: the mass matrix is not positive definite there, or all but singular"
     if status == Status.NOT_UNIQUE:
-        raise MotionError(
+        return (
             f"the motion from rest at contact {at} is not unique: the accelerations of both sides point away from it; "
             "choose one with side=+1 or side=-1"
         )
     if status == Status.NO_IMPACT:
-        raise MotionError(
-            f"{system.impact!r} has no velocity after the impact {at} with velocity {velocity:.6g} before it: no value of the "
+        return (
+            f"{system.impact!r} has no velocity after the impact {at} with velocity {velocity} before it: no value of the "
             "sign that leads on meets the law (errata 26; VelocityReduction always has one), or the model's reset leads "
             "back into the contact"
         )
     if status == Status.NOT_FINITE:
-        raise MotionError(
+        return (
             f"the motion leaves the range of numbers {at}; its velocity was last "
-            f"{velocity:.6g}; a number of the system may be too large, or a power or root of the model may have no Taylor series "
+            f"{velocity}; a number of the system may be too large, or a power or root of the model may have no Taylor series "
             "there, such as abs(x)**1.5 at x = 0"
         )
     if status == Status.STALLED and not system.model.singularity:
-        raise MotionError(f"the steps shrink to nothing {at}: the acceleration is singular there, or far too large")
+        return f"the steps shrink to nothing {at}: the acceleration is singular there, or far too large"
+    return None
 
 
 def _collect(request: MotionRequest, now: KernelState, status: int, recorder: Recorder, dense: DenseOutput | None) -> Motion:

@@ -1,0 +1,120 @@
+"""A motion's code and memory for another processor: what the page in a browser is made of.
+
+The kernels are those of this machine, from the same source; a structure's functions are the same texts. Their memory is described
+by tables that are made from the types with which they are compiled, so that nobody writes down twice where a number is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.flow.contacts.layout import ContactColumn, FrictionColumn
+from saltus.flow.kernel.compiled import (
+    MOST_COEFFICIENTS,
+    contacts_text,
+    limits_of,
+    one_contact_text,
+    program,
+    structure_functions,
+)
+from saltus.flow.kernel.layout import EventCode, Geometry, Mode, Status
+from saltus.flow.kernel.memory import ADVANCE, ADVANCE_CONTACTS, MOTION, SIZES
+from saltus.flow.motion.events import EventKind, Stop
+from saltus.flow.motion.simulate import refusal
+from saltus.systems import System
+from saltus.taylor import WrittenFunction
+
+ENUMERATIONS = (Mode, Status, EventCode, Geometry, ContactColumn, FrictionColumn)
+ENV = ("parameters", "constants", "breaks", "table")
+
+
+@dataclass(frozen=True)
+class PortableKernel:
+    """A kernel for another processor: that for models with several contacts or frictions, or that for at most one contact."""
+
+    several: bool
+
+    @property
+    def source(self) -> str:
+        """The source, with its function `advance`."""
+        return contacts_text() if self.several else one_contact_text()
+
+    @property
+    def arguments(self) -> list[dict[str, Any]]:
+        """The arguments of `advance` one after the other: their names, "array", "record" or "function", and the dimensions."""
+        names = ("numbers", "state", "env", "functions", "rows", "buffers")
+        kinds = (ADVANCE_CONTACTS if self.several else ADVANCE).args
+        return [leaf for name, kind in zip(names, kinds, strict=True) for leaf in _leaves(name, kind)]
+
+
+def _leaves(name: str, kind: Any) -> list[dict[str, Any]]:
+    if hasattr(kind, "ndim"):
+        record = hasattr(kind.dtype, "fields")
+        made = {"name": name, "kind": "record" if record else "array", "dimensions": kind.ndim}
+        return [made | {"whole": str(kind.dtype) == "int64", "size": kind.dtype.size if record else 8}]
+    if not hasattr(kind, "types"):
+        return [{"name": name, "kind": "function", "dimensions": 0}]
+    fields = getattr(kind, "fields", ENV if name == "env" else ("steps", "events"))
+    return [leaf for field, each in zip(fields, kind.types, strict=True) for leaf in _leaves(field, each)]
+
+
+class PortableMotion:
+    """What another processor needs to follow the motions of a system, with any numbers."""
+
+    def __init__(self, system: System) -> None:
+        self.system, self.run = system, program(system, limits_of(system, ()))
+        self.kernel = PortableKernel(self.run.trace.several)
+
+    def functions(self) -> list[WrittenFunction]:
+        """The functions of the structure, which the kernel calls."""
+        return structure_functions(self.run.trace)
+
+    def layout(self) -> dict[str, Any]:
+        """Where all numbers are in memory, and what those of the kernel mean."""
+        trace, structure = self.run.trace, self.run.structure
+        before = len(trace.mass) + len(trace.restitution)
+        places = {name: [MOTION.fields[name][1], bool(np.issubdtype(MOTION[name], np.integer))] for name in MOTION.names or ()}
+        return {
+            **{kind.__name__: {member.name: int(member) for member in kind} for kind in ENUMERATIONS},
+            "record": places,
+            "record_size": MOTION.itemsize,
+            "most_order": MOST_COEFFICIENTS - 2,
+            "arguments": self.kernel.arguments,
+            "several": trace.several,
+            "sizes": dict(zip(SIZES, map(int, structure.sizes), strict=True)),
+            "constant_count": structure.constant_count,
+            "modes": [0.0] * structure.frictions + [1.0] * (structure.sizes.own if trace.several else 0),
+            "signs": list(trace.signs),
+            "contact_coordinates": list(trace.contact_coordinates),
+            "friction_coordinates": list(trace.friction_coordinates),
+            "positions_at": before,
+            "grounds_at": before + len(trace.signs),
+            "contact_numbers": len(trace.contact_numbers),
+            "limits": list(self.run.limits),
+            "event_kinds": [str(kind) for kind in EventKind],
+            "refusals": {
+                int(status): text for status in Status if (text := refusal(self.system, status, "{time}", "{velocity}"))
+            },
+            "stops": self._stops(),
+            "stop_meanings": {str(stop): stop.meaning for stop in Stop},
+        }
+
+    def _stops(self) -> dict[int, str]:
+        """The name of the end of a motion for each reason that the kernel gives."""
+        known = {str(stop) for stop in Stop}
+        found = {int(status): status.name.lower() for status in Status if status.name.lower() in known}
+        if self.system.model.singularity:
+            found[Status.STALLED] = str(Stop.SINGULAR)
+        return found | {int(Status.LIMITED): str(Stop.LIMIT)}
+
+    def parts(self) -> dict[str, list[dict[str, Any]]]:
+        """The contacts and frictions of the model, by their names."""
+        model = self.system.model
+        return {
+            "contacts": [{"name": c.name, "coordinate": c.coordinate, "sign": c.sign} for c in model.contacts],
+            "frictions": [{"name": f.name, "coordinate": f.coordinate} for f in model.frictions],
+            "sides": [{"side": side} for side in model.sides],
+        }
