@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from saltus.systems import System
 
 # Raised whenever the same request gives other numbers than before: results of another version are refused and not continued.
-RESULT_VERSION = 13
+RESULT_VERSION = 14
 
 
 def provenance(system: System | None = None, *, tol: float | None = None, seed: int | None = None, **more: Any) -> dict[str, Any]:

@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 from shared_systems import forced
 
-from saltus import stability_chart
+from saltus import classify, stability_chart
+from saltus.attractors import Judged, SettledLater
 from saltus.flow import Ending
+from saltus.studies.chart import cells
+from saltus.studies.chart.chart_request import ChartRequest
+from saltus.studies.chart.motions import CellOutcome, motion_type, outcomes
 from saltus.studies.diagram.chaos_search import BandSearch
 from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.effort import CHAOS
@@ -43,3 +47,38 @@ def test_a_row_of_fig_14_and_the_diagram_along_it_have_chaos_at_the_same_values(
     assert not (in_chart & ~in_diagram & ~left_open).any()
     missed = in_diagram & ~in_chart & ~left_open  # a chart has few starts in a cell, and no motions of its neighbours' chaos
     assert missed.sum() <= 0.1 * in_diagram.sum()
+
+
+def test_a_chart_of_few_periods_does_not_take_long_transients_for_chaos():
+    """At Omega = 4 and Hhat from 7.2 to 8 there are transients (numerics.md); at 60 forcing periods a cell judges them for mean
+    lives up to 480 only, and their chaos was drawn until it was confirmed."""
+    heights = np.array([6.9, 7.2, 7.5, 7.7, 8.0, 8.5])
+    chart = stability_chart(forced(1.0, 4.0), horizontal=heights, vertical=[-0.5], periods=60, seed=1)
+    assert (chart["verdict"].values != Ending.CHAOTIC).all()
+    assert (chart["verdict"].values == Ending.TRANSIENT).sum() >= 4
+    assert (chart["count"].values > 0).all()  # what companions settled on is a motion of the cell
+    settled = classify(forced(7.2, 4.0), theta=1.0, velocity=0.3)
+    assert settled.kind is Ending.PERIODIC
+
+
+def test_a_motion_that_comes_to_no_known_orbit_is_as_undecided_in_a_chart_as_by_classify(monkeypatch):
+    """The exponent is below 0, and no period was found: `classify` says undecided, a chart said a long period."""
+
+    def judged(system, states, parameters, **options):
+        n = len(states)
+        number, none = np.full(n, -0.01), np.zeros(n, dtype=int)
+        of_period = np.where(np.arange(n) % 2, 90, 0)  # of every other cell the period is known, and longer than was looked for
+        settled = SettledLater(np.flatnonzero(of_period), np.zeros((n // 2, 2)), of_period[of_period > 0])
+        return Judged(np.full(n, Ending.PERIODIC), none, number, number, number, number, none, number, of_period, states, settled)
+
+    monkeypatch.setattr(cells, "judge", judged)
+    request = ChartRequest(
+        system=forced(0.1), horizontal=[0.1, 0.2, 0.3, 0.4], vertical=[-0.5], paths=(AMPLITUDE, "load.vertical"), max_period=6,
+        starts=4, window=None, least=1e-3, periods=100, tol=1e-10, seed=0,
+    )  # fmt: skip
+    motions = np.zeros(4, motion_type(2))
+    motions["cell"] = np.arange(4)
+    found = cells.CellVerdicts(request, motions)
+    assert found.verdict.tolist() == [Ending.UNDECIDED, Ending.PERIODIC] * 2
+    shown = outcomes(np.zeros(4, dtype=int), np.ones(4, dtype=int), found.verdict)
+    assert shown.tolist() == [CellOutcome.UNDECIDED, CellOutcome.LONG] * 2

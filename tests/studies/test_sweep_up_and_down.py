@@ -114,6 +114,18 @@ def test_falling_values_are_swept_down_first():
     assert np.array(jumps(down, "up")) == pytest.approx(np.array(jumps(up, "up")), abs=1e-4)
 
 
+@pytest.mark.parametrize("place", [1.5, 20.0])
+def test_a_start_beyond_the_contact_is_refused_as_by_simulate(place):
+    with pytest.raises(ParameterError) as refused:
+        saltus.frequency_sweep(oscillator(), [1.0, 1.1], x=place)
+    with pytest.raises(ParameterError) as expected:
+        saltus.simulate(oscillator(), periods=1, x=place)
+    assert str(refused.value) == str(expected.value)
+    assert "lies beyond the contact at x = 1" in str(refused.value)
+    with pytest.raises(ParameterError, match="lies beyond the contact at x = 1"):
+        saltus.classify(oscillator(), x=place)
+
+
 def test_a_slow_sweep_follows_the_response_within_its_rate():
     grid = np.linspace(1.3, 1.6, 601)
     data = saltus.frequency_sweep(oscillator(1.3, wall=50.0), grid, periods=1, stop_early=False, x=0.0)

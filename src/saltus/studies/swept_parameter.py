@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -11,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.checks import check_axis, check_count, check_number
-from saltus.errors import ParameterError, shown
+from saltus.errors import MotionError, ParameterError, shown
 from saltus.flow import Ending, Motion, Recurrence, captured_between, find_recurrence, rate_name, simulate
 from saltus.progress import Progress, silent
 from saltus.provenance import provenance
 from saltus.public_functions import checked_by
-from saltus.systems import System, check_along, check_path, check_system, read_start
+from saltus.systems import System, arguments_of, check_along, check_path, check_system, read_start
 
 if TYPE_CHECKING:
     import xarray
@@ -195,7 +196,7 @@ def frequency_sweep(
     Raises
     ------
     ParameterError
-        An argument without meaning; a load without a frequency.
+        An argument without meaning; a load without a frequency; a start beyond a contact.
 
     Examples
     --------
@@ -211,12 +212,21 @@ def frequency_sweep(
     order = asked.grid[:: -1 if asked.falling else 1]
     first = _swept(asked, order, asked.start, lambda done: progress(0.5 * done, f"{path} {there}"))
     reached = len(first.rows)
+    if not reached:
+        _refuse_start(asked, order[0])
     state = first.rows[-1].last[0] if reached else asked.start
     second = _swept(asked, order[:reached][::-1], state, lambda done: progress(0.5 + 0.5 * done, f"{path} {back}"))
     runs = {there: first, back: second}
     jumps = [(name, *jump) for name, run in runs.items() for jump in _jumps(asked, run)]
     progress(1.0, "done")
     return _dataset(asked, (runs["up"], runs["down"]), jumps)
+
+
+def _refuse_start(asked: SweepRequest, value: float) -> None:
+    """Refuse a start from which there is no motion at the first value, as `simulate` does: one beyond a contact, for instance."""
+    system = asked.system.with_({asked.path: float(value)})
+    with contextlib.suppress(MotionError):  # the motion begins, and cannot go on
+        simulate(system, **arguments_of(system, asked.start), periods=1, tol=asked.tol, dense=False)
 
 
 @dataclass(frozen=True)

@@ -173,7 +173,8 @@ class Borders:
     curves
         The curves on which motions end.
     endings
-        What becomes of the motion of each change, of `ending_type`, by the change's key (see `keys_of`).
+        What becomes of the motion of each change, of `ending_type`, by the change's key (see `keys_of`). Its `outcome` is a
+        number, whose words are in the `flag_meanings` of `outcome` in the group `ends` of `to_xarray`.
 
     Examples
     --------
@@ -315,7 +316,7 @@ class _BorderSearch:
         there = [has_motion(cells, changes.target[k], found["last"]["amplitude"][k]) for k in reached]
         known = reached[np.array(there, dtype=bool)]
         for key in keys_of(cells, changes.only(known)):
-            self.borders.endings[key]["outcome"] = ChangeOutcome.CONTINUED
+            self.borders.endings[key]["outcome"] = int(ChangeOutcome.CONTINUED)
         left = np.setdiff1d(reached, known)
         return changes.only(left), found[left]
 

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from saltus.attractors import JudgementSettings, judge
+from saltus.attractors import JUDGEMENT, EarlierJudgement, Judged, JudgementSettings, judge
 from saltus.flow import Ending, Recurrence
 from saltus.studies.chart.chart_request import ChartRequest
 from saltus.studies.chart.motions import (
@@ -51,15 +51,45 @@ class CellVerdicts:
             states[there, i] = motions["state"][(first + i)[there]]
         parameters = {path: values[self.cell] for path, values in request.parameters.items()}
         found = judge(request.system, states, parameters, settings=judgement(request.periods, request.tol))
-        self.verdict, self.exponent, self.error = found.ending.copy(), found.exponent, found.error
-        longer = np.unique(found.settled.question[found.settled.period > request.max_period])
+        self.verdict, self.exponent, self.error, self.settled = found.ending.copy(), found.exponent, found.error, found.settled
+        self._confirm(request, parameters, found)
+        longer = np.unique(self.settled.question[self.settled.period > request.max_period])
         # A transient to an orbit of a longer period than the chart looks for leads to none of its motions.
         self.verdict[longer[self.verdict[longer] == Ending.TRANSIENT]] = Ending.PERIODIC
-        self.later = self.cell[found.settled.question], found.settled.state
+        self.later = self.cell[self.settled.question], self.settled.state
 
+        of_no_period = (self.verdict == Ending.PERIODIC) & (found.period == 0)
+        of_no_period[longer] = False
+        self.verdict[of_no_period] = Ending.UNDECIDED  # it comes to no orbit that is known, so `classify` is not sure either
         known = (found.period > 0) & (found.period <= request.max_period)
         # Such starts end on motions that the cell has through `later`, or come to rest.
         self.settles = (self.verdict == Ending.TRANSIENT) | ((self.verdict == Ending.PERIODIC) & known)
+
+    def _confirm(self, request: ChartRequest, parameters: Mapping[str, np.ndarray], found: Judged) -> None:
+        """Judge chaos beside cells without chaos once more, as carefully as `classify`: a long transient may look like chaos.
+
+        What is then no chaos makes the chaos of its neighbours doubtful, too. Beyond the edge of the block there is no chaos.
+        """
+        confirmed = np.zeros(len(self.cell), dtype=bool)
+        while len(rows := np.flatnonzero(self._beside_no_chaos(request.shape) & ~confirmed)):
+            earlier = EarlierJudgement(found.exponent[rows], found.error[rows], _periods_without_settling(found)[rows])
+            columns = {path: values[rows] for path, values in parameters.items()}
+            settings = replace(JUDGEMENT, tol=request.tol)
+            again = judge(request.system, found.states[rows], columns, settings=settings, earlier=earlier)
+            self.verdict[rows], confirmed[rows] = again.ending, True
+            self.settled = self.settled.joined(replace(again.settled, question=rows[again.settled.question]))
+
+    def _beside_no_chaos(self, shape: tuple[int, int]) -> np.ndarray:
+        """Whether there is chaos in a cell, and none in one of the four beside it."""
+        chaos = np.zeros((shape[0] + 2, shape[1] + 2), dtype=bool)
+        row, column = (place + 1 for place in np.unravel_index(self.cell, shape))
+        chaos[row, column] = self.verdict == Ending.CHAOTIC
+        return np.asarray(chaos[row, column] & ~np.all([chaos[row + i, column + j] for i, j in SIDES], axis=0))
+
+
+def _periods_without_settling(found: Judged) -> np.ndarray:
+    """Forcing periods of companions, in all, where none of these has settled, else 0; see `Judged.mean_life`."""
+    return np.where(found.settled_count > 0, 0.0, 3.0 * found.mean_life)
 
 
 def judgement(periods: int, tol: float) -> JudgementSettings:

@@ -193,7 +193,7 @@ class CellOutcome(NumberedSentence):
     SEVERAL_MOTIONS = 2, "several stable motions"
     CHAOS = 3, "chaos, and no stable motion"
     MOTIONS_AND_CHAOS = 4, "chaos beside stable motions"
-    LONG = 5, "a motion of a longer period than is looked for, or a slow one"
+    LONG = 5, "a motion of a longer period than is looked for"
     UNDECIDED = 6, "motions of which it is not decided what they are"
     QUASI_PERIODIC = 7, "a quasi-periodic motion"
 
