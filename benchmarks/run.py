@@ -14,6 +14,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from against import beside_commit
 from auto import beside_auto
 from machine import about
 from peers import MODULES, PROTOTYPE, Peer, firsts, load_peers
@@ -67,6 +68,7 @@ def options() -> argparse.Namespace:
     )
     parser.add_argument("--grid", action="store_true", help="also a 1000 x 1000 grid of states over 100 periods")
     parser.add_argument("--only", nargs="+", choices=MODULES, default=MODULES, help="these peers alone")
+    parser.add_argument("--against", default="", metavar="COMMIT", help="instead this tree beside that one, in turn (against.py)")
     parser.add_argument("--prototype", default="", help="a folder with nb_lanes.py, to be measured beside the lanes")
     return parser.parse_args()
 
@@ -74,6 +76,9 @@ def options() -> argparse.Namespace:
 def main() -> None:
     """Measure, write, print."""
     chosen = options()
+    if chosen.against:
+        beside_commit(chosen.against, chosen.rounds or 15)
+        return
     os.environ[PROTOTYPE] = chosen.prototype
     rounds = chosen.rounds or (3 if chosen.quick else 9)
     peers, absent = load_peers(tuple(chosen.only))
