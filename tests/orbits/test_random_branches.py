@@ -13,7 +13,8 @@ from saltus.orbits import OrbitEnd, SpecialKind
 
 STEP = 0.1  # that of `continue_orbit`
 # Among them branches that cross others, nearly meet others, have tori, many grazings, or no damping.
-FEW = (4, 7, 8, 9, 10, 12, 19, 25, 29, 36, 68, 166, 306, 346, 418, 433, 491, 503)  # every model is among them
+CHOSEN = (4, 7, 8, 9, 10, 12, 19, 25, 29, 36, 68, 166, 306, 346, 418, 433, 491, 503)
+FEW = (4, 7, 9, 10, 12, 25, 36, 418, 491, 503)  # one of every model
 MANY = range(400, 600)
 
 
@@ -76,13 +77,13 @@ def test_stability_changes_at_special_points_only(seed):
     between_specials(seed)
 
 
-@pytest.mark.parametrize("seed", FEW[:10])
+@pytest.mark.parametrize("seed", FEW[:5])
 def test_ends_on_bounds_are_orbits_of_the_branch(seed):
     ends_on_its_bounds(seed)
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("seed", [*FEW, *MANY])
+@pytest.mark.parametrize("seed", [*CHOSEN, *MANY])
 def test_special_points_stability_and_ends_of_many_branches(seed):
     if not followed(seed, STEP).orbits[0].releases.size:
         same_specials(seed, 0.1)

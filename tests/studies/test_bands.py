@@ -77,6 +77,7 @@ def test_the_brackets_of_edges_are_narrow(quasi_periodic_band):
             assert not tried.chaotic[tried.values == edge.outer].any()
 
 
+@pytest.mark.thorough
 def test_bands_exclude_long_transients_and_the_more_so_beside_transients():
     """A mean life L is excluded with 95 % if none of the motions, all together, has settled within 3 L forcing periods."""
     found = bands(forced(3.0), FREQUENCY, (1.784, 1.82), count=13)

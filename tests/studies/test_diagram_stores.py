@@ -124,6 +124,7 @@ def test_one_and_two_processes_give_the_same_bytes(alone, kept, tmp_path, monkey
     xr.testing.assert_identical(diagram(store=tmp_path / "diagram.zarr", workers=2), alone)
 
 
+@pytest.mark.thorough
 def test_a_cluster_of_which_a_worker_dies_gives_the_same_diagram(alone, tmp_path):
     distributed = pytest.importorskip("distributed")
     store, struck = tmp_path / "diagram.zarr", []

@@ -8,7 +8,7 @@ import sympy as sp
 from saltus.systems import Load, RockingBlock
 
 
-@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("side", [1, pytest.param(-1, marks=pytest.mark.thorough)])
 def test_errata_10_and_11_block_follows_from_its_lagrangian(symbols, is_zero, side):
     """T of a rectangle (I_G = M R^2 / 3) rocking about a corner on a moving ground, in units (4/3) M R^2 p^2, p^2 = 3 g / (4 R).
 
