@@ -27,9 +27,12 @@ def branch_of(name, step=0.1):
 
 @cache
 def mapped(name):
-    """The points of a branch but for the special ones, with their states after a period and the derivatives, by DOP853."""
+    """Points of a branch but for the special ones, with their states after a period and the derivatives, by DOP853."""
     branch = branch_of(name)
-    points = [p for p in branch.points if not any(np.array_equal(p.place, s.point.place) for s in branch.special)]
+    points, special = branch.points, [s.point.place for s in branch.special]
+    is_special = np.array([any(np.array_equal(p.place, place) for place in special) for p in points])
+    beside = np.convolve(is_special, np.ones(3), "same") > 0  # and between them every third, as each takes 0.1 s
+    points = [p for n, p in enumerate(points) if not is_special[n] and (beside[n] or n % 3 == 0)]
     return [(point, *variational_map(point.orbit.system, np.array(point.orbit.state))) for point in points]
 
 

@@ -203,7 +203,7 @@ def fold_between_stops(e):
 
 def test_a_chart_between_stops_has_the_closed_form_as_its_border():
     """In the plane of force and restitution: the curve of folds, and the ends of motions between cells, found by simulation."""
-    axes = {"horizontal": np.linspace(0.36, 0.6, 7), "vertical": np.linspace(0.04, 0.2, 3), "paths": (FORCE, "impact.e")}
+    axes = {"horizontal": np.linspace(0.36, 0.6, 5), "vertical": np.linspace(0.04, 0.2, 3), "paths": (FORCE, "impact.e")}
     made = bordered_chart(stops(), **axes, starts=6, curves=1)
     curve = made["borders/curve_00"]
     assert (curve.attrs["kind"], curve.attrs["period"]) == ("LP", 1)
