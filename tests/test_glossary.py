@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -26,9 +27,15 @@ PERSONS = "lyapunov mavroeidis newton papageorgiou ricker wada"
 MEANINGS = {"follow": 3, "at": 4, "held": 3}  # the most functions of these names; the glossary says what they do
 
 
+@cache
+def named_nodes() -> list[ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef]:
+    kinds = (ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    trees = [ast.parse(path.read_text()) for path in sorted(SOURCE.rglob("*.py"))]
+    return [node for tree in trees for node in ast.walk(tree) if isinstance(node, kinds)]
+
+
 def definitions(kind: type | tuple[type, ...]) -> Iterator[str]:
-    for path in sorted(SOURCE.rglob("*.py")):
-        yield from (node.name for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, kind))
+    yield from (node.name for node in named_nodes() if isinstance(node, kind))
 
 
 def words(name: str) -> list[str]:

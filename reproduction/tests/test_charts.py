@@ -306,7 +306,7 @@ def test_at_many_loads_the_largest_motion_grows_with_the_angle():
         under_force(beta0=60.0).with_({"load.horizontal.amplitude": 0.34}),
         "load.vertical",
         [-1.78],
-        starts=100,
+        starts=32,
         seed=3,
         repelling=0,
     )

@@ -21,7 +21,7 @@ FOLDERS = (ROOT / "tests", ROOT / "reproduction" / "tests")
 SPECTRA = ("fig09", "fig10", "fig11", "fig12", "fig13", "fig14", "fig15", "quasi")
 ELSEWHERE = (*SPECTRA, "smoothing")  # the last is computed, judged and drawn in reproduction/tests/test_smoothing_study.py
 # Fewer values along an axis: reproduction/tests/test_both_layers.py has the loads on both sides of the one that its claim names.
-COARSE = {"both_layers": {"size": 11}}
+COARSE = {"both_layers": {"size": 5}}
 # Those of sections 2 to 5 and of the appendix; from 29 on they are our own (docs/errata.md).
 ERRATA = {*range(1, 22), 23, 25, 26, 27, 29, 40}
 

@@ -98,6 +98,7 @@ def test_chaos_is_seen_with_its_exponent(frequency, amplitude, known, periods):
     assert saltus.System.from_json(data.attrs["system"]) == system
 
 
+@pytest.mark.thorough
 def test_chaos_in_several_narrow_bands_of_the_section_is_chaos():
     """Near the end of the cascade of period doublings the chaos visits its bands in turn: the 0-1 test of all states sees order,
     and that of every eighth one chaos. The exponent is that of a motion, by another code than that of the judge."""
