@@ -14,32 +14,21 @@ from matplotlib.patches import Circle, Polygon
 
 from saltus.checks import check_number
 from saltus.errors import ParameterError, shown
-from saltus.plots.conventions import (
-    DOUBLE_COLUMN,
-    FAINT,
-    INK,
-    LIMIT,
-    STABLE,
-    UNSTABLE,
-    new_figure,
-    style,
-    symbol,
-    unit_in_brackets,
-)
+from saltus.plots.conventions import LOOK, new_figure, style, symbol, unit_in_brackets
 from saltus.plots.motion import LINES, PAIRS, arcs, coordinates
 from saltus.progress import Progress, silent
 from saltus.systems import drawing_of
 
 RESOLUTION_OF_FILMS = 110  # dots per inch: 820 x 330 points, which a page shows without scaling
 LOOKS: dict[str, dict[str, Any]] = {
-    "ground": {"color": INK, "lw": 1.2},
-    "wall": {"color": INK, "lw": 2.4},
-    "slider": {"color": INK, "lw": 1.4},
+    "ground": {"color": LOOK.ink, "lw": 1.2},
+    "wall": {"color": LOOK.ink, "lw": 2.4},
+    "slider": {"color": LOOK.ink, "lw": 1.4},
     "bar": {"color": "#5f6b76", "lw": 2.4},
-    "spring": {"color": LIMIT, "lw": 1.0},
-    "body": {"facecolor": "#d9e4f1", "edgecolor": STABLE, "lw": 1.4},
-    "mass": {"facecolor": INK, "edgecolor": INK, "lw": 0.8},
-    "hinge": {"facecolor": "white", "edgecolor": INK, "lw": 0.8},
+    "spring": {"color": LOOK.limit, "lw": 1.0},
+    "body": {"facecolor": "#d9e4f1", "edgecolor": LOOK.stable, "lw": 1.4},
+    "mass": {"facecolor": LOOK.ink, "edgecolor": LOOK.ink, "lw": 0.8},
+    "hinge": {"facecolor": "white", "edgecolor": LOOK.ink, "lw": 0.8},
 }  # by the role of a shape; those with a face are filled
 SUFFIXES = {".gif": "pillow", ".mp4": "ffmpeg", ".html": "html"}
 
@@ -50,7 +39,7 @@ def animate(
     *,
     seconds: float = 8.0,
     fps: float = 25.0,
-    width: float = DOUBLE_COLUMN,
+    width: float = LOOK.double_column,
     progress: Progress = silent,
 ) -> Any:
     """A film of a motion, or of one period of an orbit: the mechanism as it moves, beside its phase portrait.
@@ -155,7 +144,7 @@ class _Film:
         self.lines, self.dots = [], []
         for name, look in zip(names, looks, strict=True):
             time, place, velocity = arcs(data, name)
-            ax.plot(place, velocity, color=FAINT, lw=0.7, zorder=1)
+            ax.plot(place, velocity, color=LOOK.faint, lw=0.7, zorder=1)
             (line,) = ax.plot([], [], lw=1.0, zorder=2, label=f"${symbol(name)}$", **look)
             (dot,) = ax.plot([], [], marker="o", ms=5, color=look["color"], ls="none", zorder=3)
             self.lines.append((line, time, place, velocity))
@@ -189,7 +178,7 @@ class _Film:
 
 def _artist(ax: Axes, shape: Any) -> Artist:
     """A shape in axes."""
-    look = LOOKS.get(shape.role, {"color": UNSTABLE})
+    look = LOOKS.get(shape.role, {"color": LOOK.unstable})
     if shape.kind == "circle":
         face = {key: look[key] for key in ("facecolor", "edgecolor", "lw") if key in look}
         patch: Artist = Circle(tuple(shape.points[0]), shape.radius, zorder=4, **face)

@@ -11,14 +11,14 @@ from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from saltus.plots.conventions import DASHES, INK, SINGLE_COLUMN, STABLE, axes_or_new, cell_edges, drawing, legend_of
+from saltus.plots.conventions import LOOK, axes_or_new, cell_edges, drawing, legend_of
 
 FILLS = ("white", "#bcd2ea", "#f3c98b", "#c9a0c9")  # stands; overturns at once, after one impact, after more
 IMPACTS = ("without an impact", "after 1 impact", "after {} impacts")
 
 
 @drawing
-def draw_overturning(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * SINGLE_COLUMN) -> Axes:
+def draw_overturning(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * LOOK.single_column) -> Axes:
     """Draw the map of `overturning_spectrum` in shades, and its borders as lines; returns the axes."""
     own = ax is None
     ax = axes_or_new(ax, width, 0.75 * width)
@@ -31,7 +31,7 @@ def draw_overturning(dataset: Any, *, ax: Axes | None = None, width: float = 1.3
     handles: list[Any] = [Patch(facecolor=FILLS[1 + k], label=f"overturns {names[k]}") for k in shown]
     counts = dataset["border_impacts"].values
     for k, count in enumerate(sorted(set(counts.tolist()))):
-        line: dict[str, Any] = {"color": INK, "linestyle": DASHES[min(k, len(DASHES) - 1)], "linewidth": 1.0}
+        line: dict[str, Any] = {"color": LOOK.ink, "linestyle": LOOK.dashes[min(k, len(LOOK.dashes) - 1)], "linewidth": 1.0}
         for number in sorted(set(dataset["border_number"].values[counts == count].tolist())):
             part = dataset["border_number"].values == number
             marker = "." if np.count_nonzero(part) == 1 else ""
@@ -48,14 +48,14 @@ def draw_overturning(dataset: Any, *, ax: Axes | None = None, width: float = 1.3
 
 
 @drawing
-def draw_fragility(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
+def draw_fragility(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column) -> Axes:
     """Draw the share of the loads that overturn, with its interval, over the scale of `fragility`; returns the axes."""
     ax = axes_or_new(ax, width, 0.7 * width)
     scale = dataset["scale"].values
     ax.fill_between(
-        scale, dataset["lower"].values, dataset["upper"].values, color=STABLE, alpha=0.18, lw=0.0, label="95 % interval"
+        scale, dataset["lower"].values, dataset["upper"].values, color=LOOK.stable, alpha=0.18, lw=0.0, label="95 % interval"
     )
-    ax.plot(scale, dataset["share"].values, color=STABLE, lw=1.2, label=f"share of {dataset.sizes['record']} loads")
+    ax.plot(scale, dataset["share"].values, color=LOOK.stable, lw=1.2, label=f"share of {dataset.sizes['record']} loads")
     ax.set(xlabel="scale of the loads", ylabel="share that overturns", ylim=(-0.02, 1.02), xlim=(scale[0], scale[-1]))
     ax.legend(loc="best")
     return ax

@@ -14,8 +14,7 @@ from saltus.checks import check_states
 from saltus.systems.cell_chain import CellChain
 from saltus.systems.metainterface import Metainterface
 from saltus.systems.model import Model
-from saltus.systems.oscillators import BeltOscillator, ImpactPair, TwoStops, WallOscillator
-from saltus.systems.rocking_block import RockingBlock
+from saltus.systems.oscillators import BeltOscillator, ImpactPair, RockingBlock, TwoStops, WallOscillator
 from saltus.systems.system import System
 from saltus.systems.two_layer import TwoLayer
 from saltus.systems.unit_cell import CellLayout, UnitCell
