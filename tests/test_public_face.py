@@ -83,6 +83,7 @@ def good(made):
         "saltus.doubling_cascade": {"first": fold, "bounds": (0.8, 1.1)},
         "saltus.excludes_tori": {"system": SYSTEM},
         "saltus.find_attractors": {"system": SYSTEM},
+        "saltus.page": {"system": SYSTEM, "theta": 0.3},
         "saltus.frequency_sweep": {"system": SYSTEM, "values": [1.0, 1.1], "theta": 0.3},
         "saltus.find_orbit": one,
         "saltus.load": {"path": "/nowhere/result.nc"},

@@ -99,5 +99,6 @@ from .systems import VelocityReduction as VelocityReduction
 from .systems import WallOscillator as WallOscillator
 from .systems import energy_gain as energy_gain
 from .systems import register as register
+from .web.study_page import page as page
 
 __version__: str

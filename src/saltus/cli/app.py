@@ -171,6 +171,30 @@ def run(
 
 
 @app.command()
+def page(
+    study: Study,
+    results: Annotated[
+        list[Path] | None, typer.Option("--with", metavar="STORE", help="A result of the study to lay over the page; repeatable.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="The file to write.", show_default="<name of the study>.html")
+    ] = None,
+) -> None:
+    """Make a page that computes: the exact motion in a browser, as one file.
+
+    The page needs no server, no network and no Python: sliders change every
+    number of the system, and the motion with them. The first page takes some
+    ten seconds of compiling. A model of your own is Python code, and is run.
+
+    Example: [cyan]saltus page study.toml --with results/study/basins.nc[/]
+    """
+    with guarded():
+        from saltus.cli.page_command import write_page
+
+        write_page(study, results or [], output)
+
+
+@app.command()
 def plot(
     store: Annotated[Path, typer.Argument(metavar="STORE", help="A .nc file or .zarr folder that saltus has written.")],
     output: Annotated[
