@@ -35,7 +35,8 @@ def find_class(source: Source, kind: str, name: str) -> type:
     keys, known = (kind, "type"), MODELS if kind == "model" else IMPACTS
     if ":" not in name:
         if name in known:
-            return known[name]
+            found: type = known[name]
+            return found
         source.refuse(keys, f'{kind}.type "{name}" is not known; {near(name, known)} (one of your own is "file.py:Class")')
     place, _, attribute = name.rpartition(":")
     if not place.endswith(".py") and not all(part.isidentifier() for part in place.split(".")):

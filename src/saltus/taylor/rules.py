@@ -21,9 +21,7 @@ import numpy as np
 from saltus.taylor.vectors import LONG, Coefficient, Vec, add, multiply, subtract
 
 if TYPE_CHECKING:
-    from saltus.taylor.rules import Row
     from saltus.taylor.series import Series
-    from saltus.taylor.vectors import Coefficient
 
 Rule = Callable[..., None]  # arguments: the writer, the node's own series (still without this order), its operands' series
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import NamedTuple
 
 from saltus.errors import SaltusError
 
@@ -45,7 +44,8 @@ LOCAL, UNDEFINED, EXPLICIT_NAME = 0x2, 0x10, 0x40  # flags of symbols
 OF_FUNCTION, OF_DATA, OF_SECTION = 0, 1, 3  # kinds of symbols
 
 
-class Relocation(NamedTuple):
+@dataclass(frozen=True)
+class Relocation:
     """A place to be filled in, counted from the beginning of a function or of a piece of data."""
 
     kind: RelocationKind
@@ -73,7 +73,8 @@ class DataPiece:
     address: int = 0
 
 
-class Symbol(NamedTuple):
+@dataclass(frozen=True)
+class Symbol:
     """What a name stands for: a function, or an offset into a piece of data, here or elsewhere."""
 
     kind: int

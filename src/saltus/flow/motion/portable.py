@@ -76,7 +76,7 @@ class PortableMotion:
         """Where all numbers are in memory, and what those of the kernel mean."""
         trace, structure = self.run.trace, self.run.structure
         before = len(trace.mass) + len(trace.restitution)
-        places = {name: [MOTION.fields[name][1], bool(np.issubdtype(MOTION[name], np.integer))] for name in MOTION.names or ()}
+        places = {name: [field[1], bool(np.issubdtype(field[0], np.integer))] for name, field in (MOTION.fields or {}).items()}
         return {
             **{kind.__name__: {member.name: int(member) for member in kind} for kind in ENUMERATIONS},
             "record": places,
