@@ -73,6 +73,14 @@ def good(made):
     labels = np.repeat([np.arange(64) > 31], 64, axis=0).astype(int)
     functions = {
         "saltus.attractors_along": {**along, "values": [1.0, 1.1]},
+        "saltus.basin_integrity": {
+            "basins": xarray.Dataset(
+                {"label": (("y", "x"), [[1, 1], [2, 2]]), "section_x": (("attractor", "state"), [[0.0], [1.0]])}
+                | {"section_y": (("attractor", "state"), [[0.0], [1.0]])},
+                {"x": [0.0, 1.0], "y": [0.0, 1.0], "attractor": [1, 2]},
+                {"plane": ["x", "y"]},
+            )
+        },
         "saltus.basins_of_attraction": {"system": SYSTEM, "theta": [0.0, 1.0], "velocity": [0.0, 1.0]},
         "saltus.bifurcation_diagram": {"system": SYSTEM},
         "saltus.capture_speed": {"system": SYSTEM},
@@ -81,9 +89,15 @@ def good(made):
         "saltus.continue_orbit": {"orbit": orbit, "path": "load.frequency", "bounds": (0.9, 1.1)},
         "saltus.continue_special": {"special": fold, "path": "load.vertical", "bounds": (-0.6, -0.4)},
         "saltus.doubling_cascade": {"first": fold, "bounds": (0.8, 1.1)},
+        "saltus.energies": {"of": made["motion"]},
         "saltus.excludes_tori": {"system": SYSTEM},
         "saltus.find_attractors": {"system": SYSTEM},
         "saltus.page": {"system": SYSTEM, "theta": 0.3},
+        "saltus.fit": {
+            "system": SYSTEM,
+            "data": saltus.Measurement(start={"theta": 0.3}, time=[0.5, 1.0], values={"theta": [0.3, 0.2]}),
+            "parameters": {"model.damping": (0.0, 1.0)},
+        },
         "saltus.frequency_sweep": {"system": SYSTEM, "values": [1.0, 1.1], "theta": 0.3},
         "saltus.find_orbit": one,
         "saltus.load": {"path": "/nowhere/result.nc"},
@@ -92,6 +106,7 @@ def good(made):
         "saltus.load_study": {"path": "/nowhere/study.toml"},
         "saltus.lyapunov_many": one,
         "saltus.lyapunov_spectrum": one,
+        "saltus.map_over": {"function": np.hypot, "grid": {"x": [1.0]}},
         "saltus.mean_dissipated_power": {"of": made["motion"]},
         "saltus.transmissibility": {"of": made["motion"], "channel": "horizontal"},
         "saltus.plot": {"result": made["motion"]},

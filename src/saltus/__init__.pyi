@@ -8,6 +8,7 @@ from . import theory as theory
 from .attractors import Exponents as Exponents
 from .attractors import Verdict as Verdict
 from .attractors import attractors_along as attractors_along
+from .attractors import basin_integrity as basin_integrity
 from .attractors import basins_of_attraction as basins_of_attraction
 from .attractors import classify as classify
 from .attractors import excludes_tori as excludes_tori
@@ -47,6 +48,7 @@ from .orbits import backbone as backbone
 from .orbits import continue_orbit as continue_orbit
 from .orbits import continue_special as continue_special
 from .orbits import doubling_cascade as doubling_cascade
+from .orbits import energies as energies
 from .orbits import find_orbit as find_orbit
 from .orbits import free_orbit as free_orbit
 from .orbits import mean_dissipated_power as mean_dissipated_power
@@ -56,14 +58,18 @@ from .orbits import transmissibility as transmissibility
 from .plots import animate as animate
 from .plots import plot as plot
 from .progress import show_progress as show_progress
+from .studies import Fit as Fit
+from .studies import Measurement as Measurement
 from .studies import bifurcation_diagram as bifurcation_diagram
 from .studies import chaotic_bands as chaotic_bands
+from .studies import fit as fit
 from .studies import fragility as fragility
 from .studies import frequency_sweep as frequency_sweep
 from .studies import overturning_spectrum as overturning_spectrum
 from .studies import phase_portrait as phase_portrait
 from .studies import response_spectrum as response_spectrum
 from .studies import stability_chart as stability_chart
+from .sweep import map_over as map_over
 from .systems import BeltOscillator as BeltOscillator
 from .systems import Chirp as Chirp
 from .systems import Contact as Contact

@@ -72,8 +72,10 @@ RESULTS = {  # by the function that gives it
         fold(), "load.vertical", (-0.51, -0.49), first_bounds=(0.8, 1.2), most_points=10
     ),
     "saltus.doubling_cascade": lambda: saltus.doubling_cascade(doubling(), (1.6, 1.8), max_period=8),
+    "saltus.energies": lambda: saltus.energies(saltus.simulate(SYSTEM, theta=0.3, periods=3)),
     "saltus.find_attractors": lambda: saltus.find_attractors(SYSTEM, starts=8),
     "saltus.find_orbit": lambda: saltus.find_orbit(SYSTEM, theta=0.1),
+    "saltus.fit": lambda: saltus.fit(SYSTEM, record(), {"model.damping": (0.0, 1.0)}),
     "saltus.free_orbit": lambda: saltus.free_orbit(FREE, 0.2),
     "saltus.frequency_sweep": lambda: saltus.frequency_sweep(SYSTEM, [0.9, 1.0, 1.1], theta=0.3),
     "saltus.lyapunov_many": lambda: saltus.lyapunov_many(SYSTEM, {"load.frequency": [0.9, 1.0]}, theta=0.3, periods=64),
@@ -95,6 +97,11 @@ RESULTS = {  # by the function that gives it
 }
 
 
+def record():
+    times = np.linspace(0.0, 5.0, 40)
+    return saltus.Measurement(start={"theta": 0.3}, time=times, values={"theta": np.cos(times) / 3}, sigma=0.1)
+
+
 @cache
 def spectrum():
     return saltus.response_spectrum(SYSTEM, bounds=(0.9, 1.1), max_period=1, values=[1.0], starts=4, bands=False)
@@ -108,11 +115,12 @@ WITHOUT = {
     **dict.fromkeys(("saltus.transmissibility", "saltus.zero_one_test", "saltus.stop_names", "attractors.basin_entropy"), NUMBER),
     **dict.fromkeys(("flow.load_releases", "flow.stroboscopic", "orbits.defects", "orbits.is_symmetric"), NUMBER),
     "studies.wrong_cells": NUMBER,
+    "saltus.basin_integrity": NUMBER,
     "studies.disagreements": "gives a part of what studies.bordered_chart gives",
     "studies.with_borders": "gives a part of what studies.bordered_chart gives",
     "saltus.branches_of": "gives branches, each as saltus.branch_of does",
     "orbits.orbits_of": "gives orbits, each as saltus.find_orbit does",
     **dict.fromkeys(("saltus.load", "saltus.load_study", "saltus.to_mat", "saltus.plot", "saltus.register"), WRITES),
     **dict.fromkeys(("saltus.save", "saltus.show_progress", "sweep.remove_store", "sweep.status"), WRITES),
-    **dict.fromkeys(("sweep.open_store", "sweep.run"), STORE),
+    **dict.fromkeys(("sweep.open_store", "sweep.run", "saltus.map_over"), STORE),
 }

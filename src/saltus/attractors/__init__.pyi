@@ -10,6 +10,7 @@ from .basins.fractal import basin_entropy as basin_entropy
 from .basins.fractal import uncertainty_exponent as uncertainty_exponent
 from .basins.fractal import wada as wada
 from .basins.grid import basins_of_attraction as basins_of_attraction
+from .basins.integrity import basin_integrity as basin_integrity
 from .classification import Verdict as Verdict
 from .classification import classify as classify
 from .judgement import JUDGEMENT as JUDGEMENT

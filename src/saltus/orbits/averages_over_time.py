@@ -1,4 +1,4 @@
-"""Averages over time that experimenters measure: the transmissibility of a motion, and the mean power that it dissipates."""
+"""Averages over time along a motion, at Gauss's points of its steps; the transmissibility that experimenters measure."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from saltus.flow import Motion
 from saltus.orbits.free_orbits import FreeOrbit
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.public_functions import answered
-from saltus.systems import ContactModel, Model, System
+from saltus.systems import System
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(
     16
@@ -24,8 +24,20 @@ Followed = Motion | PeriodicOrbit | FreeOrbit
 Response = Callable[[np.ndarray, Any, Any], Any]
 
 
+def _slopes(nodes: np.ndarray) -> np.ndarray:
+    """The matrix that takes the values of a polynomial at the nodes to its slopes there, by the barycentric formula."""
+    one = np.eye(nodes.size)
+    apart = nodes[:, None] - nodes + one
+    products = np.prod(apart, axis=1)
+    matrix = products[:, None] / products / apart * (1.0 - one)
+    return np.asarray(matrix - np.diag(matrix.sum(axis=1)))
+
+
+SLOPES = _slopes(NODES)
+
+
 @dataclass(frozen=True)
-class _Course:
+class SampledPart:
     """A motion between two times, sampled at Gauss's points of its steps: states are (coordinates, n), all else is (n,)."""
 
     motion: Motion
@@ -45,9 +57,19 @@ class _Course:
     def length(self) -> float:
         return self.end - self.begin
 
+    def integral(self, values: Any) -> float:
+        """The integral over time, of several rows their sum."""
+        return float(np.sum(self.weight * values))
+
     def mean(self, values: Any) -> float:
         """The mean over time."""
-        return float(np.sum(self.weight * values) / self.length)
+        return self.integral(values) / self.length
+
+    def rate(self, values: np.ndarray) -> np.ndarray:
+        """The derivatives in time of values (..., n), by the polynomial through Gauss's points of each step."""
+        steps = np.reshape(values, (*values.shape[:-1], -1, NODES.size))
+        half = self.weight.reshape(-1, NODES.size)[:, :1] / WEIGHTS[0]
+        return np.reshape(steps @ SLOPES.T / half, values.shape)
 
 
 @answered
@@ -86,7 +108,7 @@ def transmissibility(of: Followed, channel: str, response: Response | None = Non
     >>> round(saltus.transmissibility(orbit, "force") * np.hypot(1 - 2.0**2, 0.1 * 2.0), 9)  # x over force
     np.float64(1.0)
     """
-    course = _course(of, periods)
+    course = course_of(of, periods)
     model, load = course.system.model, course.system.load
     if channel not in load.channels:
         raise ParameterError(f"the load has no channel {channel!r}; {near(channel, load.channels)}", "channel")
@@ -105,51 +127,11 @@ def transmissibility(of: Followed, channel: str, response: Response | None = Non
     return _deviation(course, values) / driving
 
 
-@answered
-def mean_dissipated_power(of: Followed, *, periods: int | None = None) -> float:
-    """The energy that damping, friction and impacts dissipate, divided by the time:
-
-        P = (1/D) { sum over impacts [v- M- v- - v+ M+ v+] / 2 - int v f_d dt + sum over frictions int mu_k N abs(v - w) dt },
-
-        f_d = [f(t, q, v) - f(t, q, -v)] / 2,
-
-    over one period of an orbit or the last forcing periods of a motion, of duration D. M is the mass (of the mass matrix, or
-    twice the kinetic energy over v^2), f = M q'' the generalised force and f_d its part that is odd in the velocity, such as -c
-    v; velocities are relative to the ground. On a periodic orbit P equals the mean power that the load and moving
-    grounds supply. For load (i) its unit is that of K2 over the unit of time.
-
-    Parameters
-    ----------
-    of
-        An orbit, or a motion that was kept densely.
-    periods
-        How many of the last forcing periods of a motion are used, by default 1; under a load without a frequency all of it.
-
-    Raises
-    ------
-    ParameterError
-        The motion was not kept densely or is too short; or the model gives neither its kinetic energy nor its mass
-        matrix.
-
-    Examples
-    --------
-    >>> spring = saltus.System(
-    ...     model=saltus.WallOscillator(damping=0.1, wall=9.0), load=saltus.Load(frequency=2.0, force=saltus.Harmonic(1.0))
-    ... )
-    >>> orbit = saltus.find_orbit(spring, x=0.0)
-    >>> expected = 0.1 * (2.0 * orbit.amplitude) ** 2 / 2  # c v^2 over a period
-    >>> round(float(saltus.mean_dissipated_power(orbit) / expected), 6)
-    1.0
-    """
-    course = _course(of, periods)
-    return course.mean(_friction_power(course) - _damping_power(course)) + _impact_losses(course) / course.length
-
-
-def _deviation(course: _Course, values: Any) -> float:
+def _deviation(course: SampledPart, values: Any) -> float:
     return math.sqrt(max(course.mean((values - course.mean(values)) ** 2), 0.0))
 
 
-def _course(of: Followed, periods: int | None) -> _Course:
+def course_of(of: Followed, periods: int | None) -> SampledPart:
     """An orbit's period, or the last periods of a motion."""
     if periods is not None:
         check_count("periods", periods, 1)
@@ -169,7 +151,7 @@ def _course(of: Followed, periods: int | None) -> _Course:
     middle, half = (first + 0.5 * length_left)[used], 0.5 * length_left[used]
     time = (middle[:, None] + half[:, None] * NODES).reshape(-1)
     position, velocity, side = dense.states(time)
-    return _Course(motion, begin, end, time, position, velocity, side, (half[:, None] * WEIGHTS).reshape(-1))
+    return SampledPart(motion, begin, end, time, position, velocity, side, (half[:, None] * WEIGHTS).reshape(-1))
 
 
 def _round(orbit: PeriodicOrbit | FreeOrbit) -> tuple[Motion, float, float]:
@@ -181,69 +163,3 @@ def _round(orbit: PeriodicOrbit | FreeOrbit) -> tuple[Motion, float, float]:
     edges = [time for time in motion.impacts.time.tolist() if time > motion.start + 1e-9 * orbit.duration]
     begin = 0.5 * (edges[0] + motion.start) if edges else motion.start
     return motion, begin, begin + orbit.duration
-
-
-def _has_matrix(model: Model) -> bool:
-    return isinstance(model, ContactModel)
-
-
-def _damping_power(course: _Course) -> Any:
-    """v f_d at every time, (n,)."""
-    model, load = course.system.model, course.system.load
-    if _has_matrix(model):
-        q, v = (tuple(x) if len(x) > 1 else x[0] for x in (course.position, course.velocity))
-        back = tuple(-x for x in v) if isinstance(v, tuple) else -v
-        ahead, behind = (
-            np.atleast_2d(np.array(_rows(course.system.contact_model.force(course.time, q, w, load), course.time)))
-            for w in (v, back)
-        )
-        return np.sum(course.velocity * (ahead - behind) / 2, axis=0)
-    q, v, side = course.position[0], course.velocity[0], np.where(course.side == 0, 1.0, course.side)
-    odd = (model.acceleration(course.time, q, v, side, load) - model.acceleration(course.time, q, -v, side, load)) / 2
-    return v * odd * _mass(course, course.time, q, side)
-
-
-def _friction_power(course: _Course) -> Any:
-    """The power that frictions dissipate at every time, (n,)."""
-    model, taken = course.system.model, np.zeros_like(course.time)
-    if not model.frictions:
-        return taken
-    q, v = (tuple(x) if len(x) > 1 else x[0] for x in (course.position, course.velocity))
-    forces = course.system.contact_model.normal_forces(course.time, q, v, course.system.load)
-    for friction, normal in zip(model.frictions, forces, strict=True):
-        sliding = course.velocity[model.coordinates.index(friction.coordinate)] - friction.ground_speed
-        taken = taken + friction.kinetic * normal * np.abs(sliding)
-    return taken
-
-
-def _rows(forces: Any, times: np.ndarray) -> list[np.ndarray]:
-    parts = forces if isinstance(forces, (tuple, list)) else [forces]
-    return [np.broadcast_to(np.asarray(part, dtype=float), times.shape) for part in parts]
-
-
-def _mass(course: _Course, time: Any, q: Any, side: Any) -> Any:
-    """The mass M on a side, T(1) + T(-1) - 2 T(0), as the kinetic energy T is quadratic in the velocity."""
-    model, load = course.system.model, course.system.load
-    forth, back, still = (model.kinetic_energy(time, q, v, side, load) for v in (1.0, -1.0, 0.0))
-    return forth + back - 2 * still
-
-
-def _impact_losses(course: _Course) -> float:
-    """The energy that all impacts dissipate."""
-    system, impacts = course.system, course.motion.impacts
-    late = (impacts.time > course.begin) & (impacts.time <= course.end)
-    if not late.any():
-        return 0.0
-    before, after, times = impacts.velocity_before[late], impacts.velocity_after[late], impacts.time[late]
-    if _has_matrix(system.model):
-        places, model = course.motion._states(times)[0].T, system.contact_model
-        matrices = [np.atleast_2d(np.array(model.mass_matrix(tuple(q) if len(q) > 1 else q[0]), dtype=float)) for q in places]
-        pairs = zip(np.reshape(before, places.shape), np.reshape(after, places.shape), matrices, strict=True)
-        return float(sum(0.5 * (v @ m @ v - w @ m @ w) for v, w, m in pairs))
-    load, impact, side = system.load, system.impact, impacts.side[late].astype(float)
-    beyond = np.array(
-        [system.one_contact.reset(t, v, s, load, impact)[0] for t, v, s in zip(times, before, side, strict=True)], dtype=float
-    )
-    contact = float(system.model.contact)
-    first, second = (_mass(course, times, contact, s) for s in (side, beyond))
-    return float(np.sum(0.5 * (first * before**2 - second * after**2)))

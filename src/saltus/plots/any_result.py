@@ -13,6 +13,7 @@ from saltus.plots.chaos import draw_chaotic_bands, draw_exponents, draw_exponent
 from saltus.plots.chart import draw_stability_chart
 from saltus.plots.conventions import LOOK, axes_or_new, figure_of, style
 from saltus.plots.curves import draw_attractors_along, draw_backbone, draw_branch, draw_cascade, draw_search, draw_special_curve
+from saltus.plots.measured import draw_energies, draw_fit
 from saltus.plots.motion import draw_ensemble, draw_motion, draw_sensitivities, draw_sweep
 from saltus.plots.overturning import draw_fragility, draw_overturning
 from saltus.plots.plane import draw_manifold, draw_plane, draw_separatrix
@@ -27,9 +28,11 @@ DRAWINGS: dict[str, Callable[..., Any]] = {
     "branch": draw_branch,
     "cascade": draw_cascade,
     "chaotic_bands": draw_chaotic_bands,
+    "energies": draw_energies,
     "ensemble": draw_ensemble,
     "exponents": draw_exponents,
     "fragility": draw_fragility,
+    "fit": draw_fit,
     "free_orbit": draw_motion,
     "frequency_sweep": draw_sweep,
     "lyapunov_many": draw_exponents_along,

@@ -126,7 +126,7 @@ class Plan:
         for name in ("axes", "variables", "arguments", "chunk", "attrs"):
             if not isinstance(getattr(self, name), Mapping):
                 raise ParameterError(f"{name} must be a dict, got {shown(getattr(self, name))}", name)
-        axes = {name: _axis(name, values) for name, values in self.axes.items()}
+        axes = {name: axis_values(name, values) for name, values in self.axes.items()}
         if not axes:
             raise ParameterError("axes is empty; a plan needs at least one axis")
         variables = _variables(self.variables, axes)
@@ -222,7 +222,8 @@ def _check_name(name: Any, what: str) -> None:
         )
 
 
-def _axis(name: Any, values: Any) -> np.ndarray:
+def axis_values(name: Any, values: Any) -> np.ndarray:
+    """The values of an axis of a plan, which are refused unless they are finite numbers in a list."""
     _check_name(name, "an axis")
     array = np.array(values)
     if array.ndim != 1 or not array.size or array.dtype.kind not in "iuf" or not np.isfinite(array).all():

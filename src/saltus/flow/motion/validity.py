@@ -40,6 +40,12 @@ class DenseOutput:
         slopes = coefficients[:, :, 1:] * powers[1:]
         return evaluate(coefficients, tau), evaluate(slopes, tau), self.side[step]
 
+    def accelerations(self, times: np.ndarray) -> np.ndarray:
+        """The second derivatives of the coordinates, (degrees of freedom, n)."""
+        step = np.clip(np.searchsorted(self.start, times, side="right") - 1, 0, None)
+        powers = np.arange(2, self.series.shape[2])
+        return np.asarray(evaluate(self.series[step][:, :, 2:] * (powers * (powers - 1)), times - self.start[step]))
+
 
 def evaluate(coefficients: np.ndarray, tau: np.ndarray) -> np.ndarray:
     """Horner's scheme for many series at once: (n, dof, order) at (n,) gives (dof, n)."""

@@ -1,0 +1,233 @@
+"""The energy balance of a motion: the work of each load, what damping, frictions and impacts take, what is stored."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from saltus.flow import modes_of
+from saltus.orbits.averages_over_time import Followed, SampledPart, course_of
+from saltus.public_functions import answered
+from saltus.result import result_dataset
+from saltus.systems import ContactModel, Load, mass_and_force
+
+if TYPE_CHECKING:
+    import xarray
+
+SUPPLIED, DISSIPATED, STORED = "supplied", "dissipated", "stored"
+Parts = dict[tuple[str, str], float]  # the energy of each part, by its role and its name
+
+
+@answered
+def energies(of: Followed, *, periods: int | None = None) -> xarray.Dataset:
+    """The energies of a motion by their parts: what is supplied is dissipated or stored,
+
+        sum of supplied = sum of dissipated + change of the kinetic and of the potential energy.
+
+    With the generalised force f = M q'' it is, over a time D,
+
+        v f = sum over channels c of v [f_c - f_0] + v f_d + v f_0,    f_d = [f(t, q, v) - f(t, q, -v)] / 2,
+
+    f_0 being the part of f without loads that is even in v, f_c that with the channel c alone. The work of a load is int v (f_c -
+    f_0) dt; damping takes -int v f_d dt; an impact takes [v- M- v- - v+ M+ v+] / 2; the potential energy changes by -int [v f_0 +
+    v M' v / 2] dt. A friction of the force F on a ground of speed w takes int F (w - v) dt, of which the ground supplies int F w
+    dt. Velocities are relative to the ground: of a ground that moves by a channel the force of inertia does the work.
+
+    Parameters
+    ----------
+    of
+        An orbit, or a motion that was kept densely.
+    periods
+        How many of the last forcing periods of a motion are used, by default 1; under a load without a frequency all of it.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over `part`: `energy` and `power`, the energy over the time, and the `role`: supplied (`load.force`, `load.together` of
+        channels that act on one another, `ground.belt`), dissipated (`damping`, `friction.belt`, `impact.left`; `impact` of a
+        single contact) or stored (`kinetic`, `potential`). The attribute `defect` is what is missing in the sum by rounding,
+        `duration` is D. Of loads on a metainterface the unit is that of K2.
+
+    Raises
+    ------
+    ParameterError
+        The motion was not kept densely or is too short; or the model gives neither its kinetic energy nor its mass
+        matrix.
+
+    Examples
+    --------
+    >>> balance = saltus.energies(saltus.find_orbit(wall, x=0.5))
+    >>> [str(name) for name in balance.part.values]
+    ['load.force', 'damping', 'impact', 'kinetic', 'potential']
+    >>> bool(abs(balance.defect) < 1e-12)
+    True
+    """
+    course = course_of(of, periods)
+    parts = _parts(course)
+    roles, names = zip(*parts, strict=True)
+    energy = np.array(list(parts.values()))
+    signs = np.array([{SUPPLIED: 1.0, DISSIPATED: -1.0, STORED: -1.0}[role] for role in roles])
+    columns: dict[str, tuple[Any, ...]] = {
+        "energy": ("part", energy, "1", "energy that is supplied, dissipated or stored"),
+        "power": ("part", energy / course.length, "1", "mean power"),
+        "role": ("part", list(roles), "1", "supplied, dissipated or stored"),
+    }
+    facts = {"duration": course.length, "defect": float(np.sum(signs * energy))}
+    return result_dataset("energies", columns, {"part": list(names)}, course.system, tol=course.motion.tol, **facts)
+
+
+@answered
+def mean_dissipated_power(of: Followed, *, periods: int | None = None) -> float:
+    """The energy that damping, friction and impacts dissipate, divided by the time: the dissipated parts of `energies`,
+
+        P = (1/D) { sum over impacts [v- M- v- - v+ M+ v+] / 2 - int v f_d dt + sum over frictions int F (w - v) dt },
+
+    over one period of an orbit or the last forcing periods of a motion, of duration D. On a periodic orbit P equals the mean
+    power that the load and moving grounds supply. For load (i) its unit is that of K2 over the unit of time.
+
+    Parameters
+    ----------
+    of
+        An orbit, or a motion that was kept densely.
+    periods
+        How many of the last forcing periods of a motion are used, by default 1; under a load without a frequency all of it.
+
+    Raises
+    ------
+    ParameterError
+        As for `energies`.
+
+    Examples
+    --------
+    >>> spring = saltus.System(
+    ...     model=saltus.WallOscillator(damping=0.1, wall=9.0), load=saltus.Load(frequency=2.0, force=saltus.Harmonic(1.0))
+    ... )
+    >>> orbit = saltus.find_orbit(spring, x=0.0)
+    >>> expected = 0.1 * (2.0 * orbit.amplitude) ** 2 / 2  # c v^2 over a period
+    >>> round(float(saltus.mean_dissipated_power(orbit) / expected), 6)
+    1.0
+    """
+    course = course_of(of, periods)
+    taken = sum(energy for (role, _), energy in _parts(course).items() if role == DISSIPATED)
+    return taken / course.length
+
+
+def _parts(course: SampledPart) -> Parts:
+    """The energies by their parts, those of the loads first."""
+    load, v = course.system.load, course.velocity
+    mass = _mass(course, course.time, course.position, course.side)
+    forth, back = (_force(course, load, mass, w) for w in (v, -v))
+    own = _even_force(course, Load(frequency=load.frequency), mass)
+    parts: Parts = {}
+    left = (forth + back) / 2 - own
+    for name, signal in load.channels.items():
+        alone = _even_force(course, Load(frequency=load.frequency, **{name: signal}), mass) - own
+        parts[SUPPLIED, f"load.{name}"] = course.integral(v * alone)
+        left = left - alone
+    if len(load.channels) > 1 and np.abs(left).max(initial=0.0) > 1e-12 * np.abs(forth).max(initial=0.0):
+        parts[SUPPLIED, "load.together"] = course.integral(v * left)
+    parts |= _friction_parts(course, mass, forth)
+    parts[DISSIPATED, "damping"] = -course.integral(v * (forth - back) / 2)
+    parts |= _impact_parts(course)
+    parts[STORED, "kinetic"] = _kinetic(course, -1) - _kinetic(course, 0)
+    growing = np.einsum("in,ijn,jn->n", v, course.rate(mass), v) / 2
+    parts[STORED, "potential"] = -course.integral(np.sum(v * own, axis=0) + growing)
+    return parts
+
+
+def _friction_parts(course: SampledPart, mass: np.ndarray, force: np.ndarray) -> Parts:
+    """What the grounds of frictions supply, where they move, and what the frictions take."""
+    system, parts = course.system, Parts()
+    if not isinstance(system.model, ContactModel) or not system.contact_model.frictions:
+        return parts
+    model, load = system.contact_model, system.load
+    normals = model.normal_forces(course.time, *_state(course.position, course.velocity), load)
+    holding = np.einsum("ijn,jn->in", mass, course.rate(course.velocity)) - force  # what makes a coordinate stick
+    slides = modes_of(model, course.side)[1]
+    for friction, normal, slide in zip(model.frictions, normals, slides, strict=True):
+        i, ground = model.coordinates.index(friction.coordinate), friction.ground_speed
+        acting = np.where(slide == 0, holding[i], -friction.kinetic * normal * slide)
+        if ground:
+            parts[SUPPLIED, f"ground.{friction.name}"] = course.integral(acting * ground)
+        parts[DISSIPATED, f"friction.{friction.name}"] = course.integral(acting * (ground - course.velocity[i]))
+    return parts
+
+
+def _impact_parts(course: SampledPart) -> Parts:
+    """What impacts take, by the contacts that they close."""
+    parts: Parts = {}
+    for name, lost in _impact_losses(course):
+        parts[DISSIPATED, name] = parts.get((DISSIPATED, name), 0.0) + lost
+    return parts
+
+
+def _impact_losses(course: SampledPart) -> Iterator[tuple[str, float]]:
+    """The name of each impact's part, and the kinetic energy that it takes."""
+    system, impacts = course.system, course.motion.impacts
+    late = (impacts.time > course.begin) & (impacts.time <= course.end)
+    if not late.any():
+        return
+    times, side = impacts.time[late], impacts.side[late].astype(float)
+    before, after = (np.reshape(v[late], (times.size, -1)).T for v in (impacts.velocity_before, impacts.velocity_after))
+    names, beyond = ["impact"] * times.size, side
+    if isinstance(system.model, ContactModel):
+        places = course.motion._states(times)[0]
+        called = [contact.name for contact in system.contact_model.contacts]
+        names = ["impact." + "+".join(c for i, c in enumerate(called) if int(bits) >> i & 1) for bits in side]
+    else:
+        places = np.full((1, times.size), float(system.model.contact))
+        reset, given = system.one_contact.reset, zip(times, before[0], side, strict=True)
+        beyond = np.array([reset(t, v, s, system.load, system.impact)[0] for t, v, s in given], dtype=float)
+    first, second = (_mass(course, times, places, s) for s in (side, beyond))
+    lost = (np.einsum("in,ijn,jn->n", before, first, before) - np.einsum("in,ijn,jn->n", after, second, after)) / 2
+    yield from zip(names, lost.tolist(), strict=True)
+
+
+def _kinetic(course: SampledPart, place: int) -> float:
+    """The kinetic energy at the beginning (0) or at the end (-1) of the course."""
+    time = np.array([(course.begin, course.end)[place]])
+    q, v, side = course.motion._states(time)
+    return float(np.einsum("in,ijn,jn->n", v, _mass(course, time, q, np.where(side == 0, 1, side)), v)[0]) / 2
+
+
+def _even_force(course: SampledPart, load: Load, mass: np.ndarray) -> np.ndarray:
+    """The part of the generalised force under a load that is even in the velocity, (coordinates, n)."""
+    forth, back = (_force(course, load, mass, v) for v in (course.velocity, -course.velocity))
+    return np.asarray((forth + back) / 2)
+
+
+def _force(course: SampledPart, load: Load, mass: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+    """The generalised force f = M q'' without reactions and frictions at a velocity, (coordinates, n)."""
+    model, state = course.system.model, _state(course.position, velocity)
+    if isinstance(model, ContactModel):
+        return _rows(mass_and_force(model, course.time, *state, load)[1], course.time)
+    answer = model.acceleration(course.time, *state, np.where(course.side == 0, 1.0, course.side), load)
+    return np.asarray(np.einsum("ijn,jn->in", mass, _rows(answer if isinstance(answer, tuple) else [answer], course.time)))
+
+
+def _state(position: np.ndarray, velocity: np.ndarray) -> tuple[Any, Any]:
+    """Coordinates and velocities as a model takes them: arrays for a single coordinate, tuples of arrays for several."""
+    return (tuple(position), tuple(velocity)) if len(position) > 1 else (position[0], velocity[0])
+
+
+def _rows(values: Any, times: np.ndarray) -> np.ndarray:
+    return np.array([np.broadcast_to(np.asarray(value, dtype=float), times.shape) for value in values])
+
+
+def _mass(course: SampledPart, time: np.ndarray, position: np.ndarray, side: Any) -> np.ndarray:
+    """The mass matrix, (coordinates, coordinates, n): the model's own or, as the kinetic energy T is quadratic in the velocity,
+    T(e_i + e_j) - T(e_i) - T(e_j) + T(0)."""
+    model, load = course.system.model, course.system.load
+    still = np.zeros_like(position)
+    if isinstance(model, ContactModel):
+        return np.array([_rows(row, time) for row in mass_and_force(model, time, *_state(position, still), load)[0]])
+    one = np.eye(len(position))[:, :, None] + still
+    side = np.where(np.asarray(side) == 0, 1.0, side)
+
+    def energy(velocity: np.ndarray) -> Any:
+        return model.kinetic_energy(time, *_state(position, velocity), side, load)
+
+    none = energy(still)
+    return np.array([_rows([energy(a + b) - energy(a) - energy(b) + none for b in one], time) for a in one])

@@ -1,0 +1,95 @@
+"""A quantity of one's own over a grid: what it returns, where its function may stand, and how it goes on."""
+
+import numpy as np
+import pytest
+
+import saltus
+from saltus.errors import ParameterError, SweepError
+
+GRID = {"x": [1.0, 2.0, 3.0], "y": [0.0, 10.0]}
+
+
+def total(x, y):
+    return x + y
+
+
+def several(x, y):
+    return {"sum": x + y, "powers": [x, x**2, x**3], "whole": int(x), "true": x > y, "wave": np.exp(1j * x)}
+
+
+def test_a_number_at_every_point_is_the_variable_value():
+    data = saltus.map_over(total, GRID)
+    assert data.value.dims == ("x", "y")
+    np.testing.assert_array_equal(data.value, [[1.0, 11.0], [2.0, 12.0], [3.0, 13.0]])
+    np.testing.assert_array_equal(data.x, GRID["x"])
+
+
+def test_names_arrays_and_complex_numbers_are_kept():
+    data = saltus.map_over(several, GRID, chunk={"y": 2})
+    np.testing.assert_array_equal(data["sum"], [[1.0, 11.0], [2.0, 12.0], [3.0, 13.0]])
+    assert data.powers.dims == ("x", "y", "powers_0")
+    np.testing.assert_array_equal(data.powers.sel(x=2.0, y=10.0), [2.0, 4.0, 8.0])
+    np.testing.assert_array_equal(data.true[:, 0], 1.0)
+    np.testing.assert_allclose(data.wave[:, 0], np.exp(1j * np.array(GRID["x"])))
+
+
+@pytest.mark.parametrize("where", ["a module", "another function", "a notebook"])
+def test_processes_find_a_function_wherever_it_stands(where, tmp_path):
+    factor = 2.0
+    function = total if where == "a module" else (lambda x, y: factor * total(x, y))
+    if where == "a notebook":  # it is in no file, and its module is __main__ in every process
+        cell: dict = {"__name__": "__main__"}
+        exec("def function(x, y):\n    return 2.0 * (x + y)\n", cell)
+        function = cell["function"]
+    data = saltus.map_over(function, GRID, store=tmp_path / "kept.zarr", workers=2)
+    np.testing.assert_array_equal(data.value, (1.0 if where == "a module" else 2.0) * np.add.outer(GRID["x"], GRID["y"]))
+
+
+def test_what_is_kept_is_not_computed_again_after_a_failure(tmp_path):
+    asked, broken = [], [True]
+
+    def fragile(x, y):
+        asked.append((x, y))
+        if broken[0] and x == 2.0:
+            raise ValueError("no answer here")
+        return x * y
+
+    with pytest.raises(SweepError, match="no answer here"):
+        saltus.map_over(fragile, GRID, store=tmp_path / "kept.zarr", retries=0)
+    asked.clear()
+    broken[0] = False
+    data = saltus.map_over(fragile, GRID, store=tmp_path / "kept.zarr")
+    assert sorted(asked) == [(2.0, 0.0), (2.0, 10.0)]
+    np.testing.assert_array_equal(data.value, np.multiply.outer(GRID["x"], GRID["y"]))
+    asked.clear()
+    saltus.map_over(fragile, GRID, store=tmp_path / "kept.zarr")
+    assert not asked
+
+
+def test_a_store_of_another_text_or_another_grid_is_refused(tmp_path):
+    store = tmp_path / "kept.zarr"
+    saltus.map_over(lambda x: x + 1, {"x": [1.0]}, store=store)
+    with pytest.raises(ParameterError, match="text has changed"):
+        saltus.map_over(lambda x: x + 2, {"x": [1.0]}, store=store)
+    with pytest.raises(ParameterError):
+        saltus.map_over(lambda x: x + 1, {"x": [2.0]}, store=store)
+
+
+@pytest.mark.parametrize(
+    ("function", "grid", "sentence"),
+    [
+        (3.0, GRID, "function must be a function"),
+        (total, {}, "grid must be a dict"),
+        (total, {"x": ["a"], "y": [0.0]}, "axis 'x' must be"),
+        (lambda x, y: "word", GRID, "function must return numbers, got 'word' at"),
+        (lambda x, y: {"a": None}, GRID, "function must return numbers, got as 'a' None"),
+    ],
+)
+def test_what_has_no_meaning_is_refused(function, grid, sentence):
+    with pytest.raises(ParameterError, match=sentence):
+        saltus.map_over(function, grid)
+
+
+def test_shapes_that_differ_are_refused():
+    with pytest.raises(ParameterError, match="shape"):
+        saltus.map_over(lambda x: np.ones(int(x)), {"x": [1.0, 2.0]}, retries=0)
