@@ -64,6 +64,15 @@ def test_a_ball_that_comes_to_rest_now_and_then_is_no_chaos_but_of_a_long_period
     assert verdict.evidence["largest_exponent"] + verdict.evidence["largest_exponent_error"] < 0.0
     rests = saltus.simulate(ball, x=-0.5, periods=1000, dense=False).events.of(EventKind.REST)
     assert len(rests) > 1
+    assert "a larger max_period may find, unless rounding decides its period" in verdict.reason
+    looked_for = classify(ball, x=-0.5, max_period=300)  # what the sentence advises
+    assert looked_for.kind is Ending.UNDECIDED
+    assert looked_for.cause is Reason.ROUNDING
+    periods = [
+        find_recurrence(ball, np.array([[-0.5, 0.0]]), 4000, max_period=300, kept=602, tol=t).period[0] for t in (1e-12, 1e-10)
+    ]
+    assert periods[0] != periods[1]  # each step error has another period, so that none is the motion's
+    assert "no orbit can be told" in looked_for.reason
 
 
 def test_an_orbit_with_rest_is_periodic():

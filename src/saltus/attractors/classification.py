@@ -19,7 +19,7 @@ from saltus.attractors.nonperiodic import FEWEST_ENTRIES, ZeroOne, excludes_tori
 from saltus.attractors.stroboscopic_section import Certificate, certify, stays_at_rest, with_clock
 from saltus.checks import check_count, check_number
 from saltus.errors import MotionError
-from saltus.flow import RECURRENCE, Ending, Recurrence, find_recurrence, simulate
+from saltus.flow import RECURRENCE, Ending, EventKind, Recurrence, find_recurrence, simulate
 from saltus.notebook import html_table
 from saltus.orbits import PeriodicOrbit
 from saltus.progress import Progress, part_of, silent
@@ -242,9 +242,30 @@ def _settled(case: _Case, ends: Recurrence, start: np.ndarray) -> Verdict | None
         return _ended(case, ends, start)
     if not ends.periodic[0]:
         return None
-    period = int(ends.period[0])
+    period, seen = int(ends.period[0]), "it repeats itself"
     found = certify(case.clock, ends.states[0, -1], period)
-    return _on_orbit(case, ends, found, "it repeats itself" + (f" every {period} forcing periods" if period > 1 else ""))
+    every = f"every {period} forcing periods" if period > 1 else ""
+    if not found.sound and (other := _period_by_the_judge(case, ends)) not in (None, period):
+        again = f"every {other}" if other else "not at all"
+        numbers = {"seen": f"{seen} {every}", "tol": case.tol, "looser": JUDGEMENT.tol, "other": again}
+        return case.undecided(Reason.ROUNDING, ends, numbers)
+    return _on_orbit(case, ends, found, f"{seen} {every}".rstrip())
+
+
+def _period_by_the_judge(case: _Case, ends: Recurrence) -> int | None:
+    """The period of the motion from the same state with the judge's steps, 0 if it then does not repeat itself; None if the
+    motion does not rest within its period.
+
+    A motion that rests now and then returns to one state exactly, also where what it does in between is too sensitive to be
+    computed: its period is then another with every change of rounding.
+    """
+    start, period = arguments_of(case.system, ends.states[0, -1]), int(ends.period[0])
+    if not len(simulate(case.clock, **start, periods=period, dense=False).events.of(EventKind.REST)):
+        return None
+    longest = max(case.max_period, RECURRENCE.compiled_max_period)
+    options: dict[str, Any] = {"max_period": longest, "kept": 2 * longest + 2, "tol": JUDGEMENT.tol}
+    again = find_recurrence(case.clock, ends.states[:, -1], max(case.periods, 2 * longest), **options)
+    return int(again.period[0])
 
 
 def _ended(case: _Case, ends: Recurrence, start: np.ndarray) -> Verdict:

@@ -33,7 +33,7 @@ class Reason(NumberedSentence):
         4,
         (
             "{seen}: motions beside it come together with it, so that it settles slowly, or on an orbit of more than "
-            "{longest} forcing periods, which a larger max_period may find"
+            "{longest} forcing periods, which a larger max_period may find, unless rounding decides its period"
         ),
     )
     TORUS = 5, "{seen}, it does not repeat itself, and the 0-1 test sees order (K = {K:.3g})"
@@ -54,6 +54,13 @@ class Reason(NumberedSentence):
         (
             "under constant loads it goes on moving: the ground that its friction moves on may drive it round a cycle, which has "
             "no forcing period"
+        ),
+    )
+    ROUNDING = (
+        19,
+        (
+            "{seen} when steps make an error of {tol:.0e}, and {other} when they make {looser:.0e}: differences grow so much "
+            "from one rest to the next that rounding decides the period, and no orbit can be told"
         ),
     )
 
