@@ -18,7 +18,7 @@ from saltus.web.linker import link
 from saltus.web.objects import kernel_object, structure_object
 
 FREQUENCY = "load.frequency"
-EXPORTED = ("advance", "rewind", "constants")
+EXPORTED = ("advance", "rewind", "constants", "edges")
 
 
 def page_parts(system: System) -> tuple[bytes, dict[str, Any]]:
@@ -34,7 +34,7 @@ def page_parts(system: System) -> tuple[bytes, dict[str, Any]]:
     called = [argument["name"] for argument in motion.kernel.arguments if argument["kind"] == "function"]
     objects = [kernel_object(several), structure_object(motion.functions())]
     linked = link(objects, (*EXPORTED, "matrices" if several else "geometry"), called)
-    engine = motion.layout() | {"pointers": linked.table, "heap": linked.heap, "records": {"rows": [], "breaks": 0, "width": 0}}
+    engine = motion.layout() | {"pointers": linked.table, "heap": linked.heap}
     return linked.content, description(motion) | {"engine": engine}
 
 

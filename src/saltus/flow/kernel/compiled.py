@@ -321,6 +321,11 @@ def _tangent(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
     return _function("tangent", places, cases)
 
 
+def edges_function(roots: Sequence[Expr]) -> WrittenFunction:
+    """The function `edges(parameters, out)`, which fills an array with the values of expressions of the parameters."""
+    return WrittenFunction("edges", memory.CONSTANTS, Places(("parameters", "out"), ENV), SCALAR, [Case(tape(roots, {}), [("out", i) for i in range(len(roots))])])
+
+
 def _table(name: str, places: Places, roots: list[Expr], known: dict[Expr, int]) -> WrittenFunction:
     """A function that fills its last argument with the values of expressions of the parameters."""
     targets = [(places.arguments[-1], i) for i in range(len(roots))]

@@ -7,6 +7,7 @@ by tables that are made from the types with which they are compiled, so that nob
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from saltus.flow.contacts.layout import ContactColumn, FrictionColumn
 from saltus.flow.kernel.compiled import (
     MOST_COEFFICIENTS,
     contacts_text,
+    edges_function,
     limits_of,
     one_contact_text,
     program,
@@ -24,8 +26,9 @@ from saltus.flow.kernel.layout import EventCode, Geometry, Mode, Status
 from saltus.flow.kernel.memory import ADVANCE, ADVANCE_CONTACTS, MOTION, SIZES
 from saltus.flow.motion.events import EventKind, Stop
 from saltus.flow.motion.simulate import refusal
-from saltus.systems import System
-from saltus.taylor import WrittenFunction
+from saltus.systems import Pulse, System, children, substitute
+from saltus.taylor import RECORD_WIDTH, Expr, WrittenFunction, record_table
+from saltus.taylor.load_tables import AFTER, SINCE, WITHIN
 
 ENUMERATIONS = (Mode, Status, EventCode, Geometry, ContactColumn, FrictionColumn)
 ENV = ("parameters", "constants", "breaks", "table")
@@ -61,6 +64,13 @@ def _leaves(name: str, kind: Any) -> list[dict[str, Any]]:
     return [leaf for field, each in zip(fields, kind.types, strict=True) for leaf in _leaves(field, each)]
 
 
+def part_at(system: Any, path: str) -> Any:
+    """The part of a system, or of its copy with symbols, at a dotted path."""
+    for name in path.split("."):
+        system = children(system)[name]
+    return system
+
+
 class PortableMotion:
     """What another processor needs to follow the motions of a system, with any numbers."""
 
@@ -68,9 +78,15 @@ class PortableMotion:
         self.system, self.run = system, program(system, limits_of(system, ()))
         self.kernel = PortableKernel(self.run.trace.several)
 
+        once = {path: part_at(system, path) for path, _ in self.run.trace.records}
+        self._pulses = [path for path, signal in once.items() if isinstance(signal, Pulse)]
+
     def functions(self) -> list[WrittenFunction]:
-        """The functions of the structure, which the kernel calls."""
-        return structure_functions(self.run.trace)
+        """The functions of the structure, which the kernel calls, and `edges`, when each pulse of the load begins and ends."""
+        places = count()
+        twin = substitute(self.system, lambda path, value: Expr("parameter", (), next(places)))
+        pulses = [part_at(twin, path) for path in self._pulses]
+        return [*structure_functions(self.run.trace), edges_function([t for p in pulses for t in (p.start, p.start + p.length)])]
 
     def layout(self) -> dict[str, Any]:
         """Where all numbers are in memory, and what those of the kernel mean."""
@@ -94,6 +110,7 @@ class PortableMotion:
             "grounds_at": before + len(trace.signs),
             "contact_numbers": len(trace.contact_numbers),
             "limits": list(self.run.limits),
+            "records": self._records(),
             "event_kinds": [str(kind) for kind in EventKind],
             "refusals": {
                 int(status): text for status in Status if (text := refusal(self.system, status, "{time}", "{velocity}"))
@@ -101,6 +118,19 @@ class PortableMotion:
             "stops": self._stops(),
             "stop_meanings": {str(stop): stop.meaning for stop in Stop},
         }
+
+    def _records(self) -> dict[str, Any]:
+        """What the load reads of tables in time: of pulses, which clock it is; of records, their own breakpoints and polynomials."""
+        rows: list[dict[str, Any]] = []
+        for path, order in self.run.trace.records:
+            if path in self._pulses:
+                rows.append({"pulse": self._pulses.index(path), "order": order})
+            else:
+                breaks, table = record_table(self.system, [(path, order)])
+                rows.append({"breaks": breaks.tolist(), "table": table[0].tolist()})
+        most = 2 * len(self._pulses) + sum({row["breaks"][0]: len(row["breaks"]) for row in rows if "breaks" in row}.values())
+        clocks = {"since": SINCE, "within": WITHIN, "after": AFTER}
+        return {"rows": rows, "pulses": len(self._pulses), "most": most, "width": RECORD_WIDTH, **clocks}
 
     def _stops(self) -> dict[int, str]:
         """The name of the end of a motion for each reason that the kernel gives."""

@@ -94,6 +94,41 @@ function hornerSlope(coefficients, from, length, tau) {
   return value;
 }
 
+/**
+ * A row of a pulse: its time since the start, whether it acts, or the time since its end, in each piece.
+ * @param {Float64Array} row @param {Float64Array} breaks @param {number} start @param {number} end @param {number} order
+ * @param {any} layout
+ */
+function fillClock(row, breaks, start, end, order, layout) {
+  const { width, since, within, after } = layout;
+  breaks.forEach((at, i) => {
+    const piece = (i + 1) * width;
+    const acts = at >= start && at < end ? 1 : 0;
+    const past = at >= end ? 1 : 0;
+    if (order === since) row[piece] = past ? end - start : acts ? at - start : 0;
+    if (order === after) row[piece] = past ? at - end : 0;
+    if (order === since) row[piece + 1] = acts;
+    else if (order === after) row[piece + 1] = past;
+    else if (order === within) row[piece] = acts;
+    else if (order === after + 1) row[piece] = past;
+  });
+}
+
+/**
+ * A row of a record: its own polynomials, counted from the load's breakpoints.
+ * @param {Float64Array} row @param {Float64Array} breaks @param {any} record @param {number} width
+ */
+function fillRecord(row, breaks, record, width) {
+  for (let i = 0; i <= breaks.length; i++) {
+    const anchor = breaks[Math.max(i - 1, 0)];
+    const piece = i === 0 ? 0 : placeAbove(record.breaks, anchor);
+    const shift = anchor - record.breaks[Math.max(piece - 1, 0)];
+    const own = Float64Array.from(record.table[piece]);
+    for (let k = 0; k < width - 1; k++) for (let j = width - 2; j >= k; j--) own[j] += shift * own[j + 1];
+    row.set(own, i * width);
+  }
+}
+
 /** The place of the first of sorted numbers that is larger @param {ArrayLike<number>} sorted @param {number} value */
 function placeAbove(sorted, value) {
   let low = 0;
@@ -150,7 +185,7 @@ export class Engine {
     this.width = this.several ? kept : 3;
     this.terms = layout.most_order + 2;
     const rows = this.contacts.length + this.frictions.length;
-    const breaks = layout.records.breaks;
+    const breaks = layout.records.most;
     /** @type {{[name: string]: number[]}} */
     this.lengths = {
       numbers: [1],
@@ -242,35 +277,51 @@ export class Engine {
   }
 
   /**
-   * The breakpoints of the load, and the polynomials between them.
+   * The breakpoints of the load, and the polynomials between them: Python's `record_table`.
    * @param {Float64Array} parameters
    */
   records(parameters) {
-    const { rows, breaks: count, width } = this.layout.records;
+    const { rows, pulses, width } = this.layout.records;
     if (!rows.length) return [new Float64Array(0), new Float64Array(0)];
-    throw new Refusal("load", `records are not there yet ${parameters.length} ${count} ${width}`);
+    this._put("parameters", parameters);
+    this.exports.edges(this.addresses.parameters, this.results);
+    const edges = this._doubles(this.results, 2 * pulses).slice();
+    const all = [...edges, ...rows.flatMap((/** @type {any} */ row) => row.breaks ?? [])];
+    const breaks = Float64Array.from(new Set(all)).sort();
+    const size = (breaks.length + 1) * width;
+    const table = new Float64Array(rows.length * size);
+    rows.forEach((/** @type {any} */ row, /** @type {number} */ i) => {
+      const own = table.subarray(i * size, (i + 1) * size);
+      if (row.breaks) fillRecord(own, breaks, row, width);
+      else fillClock(own, breaks, edges[2 * row.pulse], edges[2 * row.pulse + 1], row.order, this.layout.records);
+    });
+    return [breaks, table];
   }
 
   /** The numbers that Python's traced functions make of the parameters: the constants and the contact's geometry.
    * @param {PageSystem} system @returns {[Float64Array, Float64Array]} */
   derived(system) {
     const { addresses, exports } = this;
-    this._put("parameters", system.parameters);
+    const pieces = system.breaks.length + 1;
+    for (const name of ["parameters", "breaks", "table"]) this._put(name, /** @type {any} */ (system)[name]);
     exports.constants(addresses.parameters, addresses.constants);
     const constants = this._doubles(addresses.constants, this.layout.constant_count).slice();
     if (this.several) {
       const count = this.layout.contact_numbers;
-      this._env(exports.matrices, 0n, this.scratch, this.results);
+      this._env(exports.matrices, pieces, 0n, this.scratch, this.results);
       return [constants, this._doubles(this.results, count).slice()];
     }
-    this._env(exports.geometry, this.addresses.geometry);
+    this._env(exports.geometry, pieces, this.addresses.geometry);
     return [constants, this._doubles(addresses.geometry, 3).slice()];
   }
 
-  /** Call a function of the structure whose first argument is the environment. @param {Function} call @param {any[]} rest */
-  _env(call, ...rest) {
+  /**
+   * Call a function of the structure whose first argument is the environment.
+   * @param {Function} call @param {number} pieces of the load @param {any[]} rest
+   */
+  _env(call, pieces, ...rest) {
     const { addresses, lengths } = this;
-    const table = [addresses.table, BigInt(lengths.table[1]), BigInt(lengths.table[2])];
+    const table = [addresses.table, BigInt(pieces), BigInt(lengths.table[2])];
     call(addresses.parameters, addresses.constants, addresses.breaks, ...table, ...rest);
   }
 
@@ -415,7 +466,10 @@ class Run {
   /** The arguments of the kernel, in words of memory. */
   _request() {
     const { engine } = this;
-    const lengths = { ...engine.lengths, step_series: [BUFFER, engine.dof, this.order + 2] };
+    const { breaks } = this.system;
+    const [rows, , width] = engine.lengths.table;
+    const own = { breaks: [breaks.length], table: [rows, breaks.length + 1, width] };
+    const lengths = { ...engine.lengths, ...own, step_series: [BUFFER, engine.dof, this.order + 2] };
     const words = [];
     for (const argument of engine.layout.arguments) {
       if (argument.kind === "function") words.push(engine.layout.pointers[argument.name]);
