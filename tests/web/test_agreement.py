@@ -1,0 +1,193 @@
+"""The page's engine in node against Python: random systems of all models, event by event.
+
+Both follow the same equations, and round differently. By how much rounding grows along a motion is measured in Python, by
+starting it again beside its start; a motion is compared as long as this stays small.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import saltus
+from saltus.web import one_file
+from saltus.web.description import page_parts
+
+NODE = shutil.which("node")
+pytestmark = pytest.mark.skipif(NODE is None, reason="node is not installed here")
+Harmonic, Load, System = saltus.Harmonic, saltus.Load, saltus.System
+NEAR = 1e-12
+
+
+def shaken(rng, channel, **more):
+    return Load(
+        frequency=rng.uniform(0.5, 2.0), **{channel: Harmonic(rng.uniform(0.1, 1.0), phase=rng.uniform(0.0, 6.0))}, **more
+    )
+
+
+def cell(rng):
+    load = shaken(rng, "horizontal", vertical=rng.uniform(-0.8, -0.2))
+    model = saltus.Metainterface(beta0=rng.uniform(1.2, 1.5), damping=rng.uniform(0.02, 0.3), mass_ratio=rng.uniform(0.0, 0.5))
+    return System(model=model, load=load, impact=saltus.VelocityReduction(rng.uniform(0.5, 1.0))), {"theta": 0.3}
+
+
+def inelastic_cell(rng):
+    load = shaken(rng, "ground_horizontal", vertical=rng.uniform(-0.6, -0.3))
+    model = saltus.Metainterface(beta0=rng.uniform(1.3, 1.5), damping=rng.uniform(0.02, 0.3))
+    return System(model=model, load=load, impact=saltus.InelasticImpact()), {"theta": 0.2}
+
+
+def wall(rng):
+    load = Load(frequency=rng.uniform(0.6, 2.0), force=[Harmonic(rng.uniform(0.2, 1.0)), Harmonic(0.2, order=2), 0.1])
+    model = saltus.WallOscillator(damping=rng.uniform(0.0, 0.3), wall=rng.uniform(-0.2, 0.5))
+    return System(model=model, load=load, impact=saltus.EnergyRestitution(rng.uniform(0.3, 1.0))), {"x": -0.3}
+
+
+def block(rng):
+    pulse = saltus.OneSine(
+        amplitude=rng.uniform(1.0, 2.0), frequency=rng.uniform(2.0, 6.0), start=rng.uniform(0.0, 1.0), quantity="acceleration"
+    )
+    system = System(
+        model=saltus.RockingBlock(alpha=rng.uniform(0.1, 0.3)),
+        load=Load(ground_horizontal=pulse),
+        impact=saltus.VelocityReduction(rng.uniform(0.7, 0.95)),
+    )
+    return system, {"theta": 0.0}
+
+
+def stops(rng):
+    model = saltus.TwoStops(damping=rng.uniform(0.0, 0.2), left=-rng.uniform(0.2, 1.0), right=rng.uniform(0.3, 1.0))
+    law = saltus.NewtonImpact(e=rng.uniform(0.3, 0.9))
+    return System(model=model, load=shaken(rng, "force"), impact=law), {"x": 0.1, "velocity": 0.3}
+
+
+def pair(rng):
+    model = saltus.ImpactPair(damping=rng.uniform(0.05, 0.3), mass_ratio=rng.uniform(0.05, 0.5), clearance=rng.uniform(0.3, 1.0))
+    system = System(model=model, load=shaken(rng, "force"), impact=saltus.NewtonImpact(e=rng.uniform(0.4, 0.8)))
+    return system, {"z": 0.1, "x": 0.1}
+
+
+def belt(rng):
+    kinetic = rng.uniform(0.1, 0.4)
+    model = saltus.BeltOscillator(kinetic=kinetic, static=kinetic + rng.uniform(0.0, 0.3), belt_speed=rng.uniform(-0.3, 0.5))
+    return System(model=model, load=shaken(rng, "force")), {"x": 0.0, "velocity": 0.05}
+
+
+def layers(rng):
+    load = shaken(rng, "horizontal", vertical=rng.uniform(-0.6, -0.3))
+    model = saltus.TwoLayer(beta0=rng.uniform(1.3, 1.5), damping=rng.uniform(0.05, 0.3), mass_ratio=rng.uniform(0.0, 0.5))
+    law = saltus.NewtonImpact(e=rng.uniform(0.0, 0.5), transfer=rng.uniform(0.3, 0.9))
+    return System(model=model, load=load, impact=law), {"theta_1": 0.2, "theta_2": 0.0}
+
+
+def cells(rng):
+    load = shaken(rng, "horizontal", vertical=rng.uniform(-0.6, -0.3))
+    model = saltus.TwoCells(beta0=rng.uniform(1.3, 1.5), damping=rng.uniform(0.05, 0.3), coupling=rng.uniform(0.0, 0.3))
+    law = saltus.NewtonImpact(e=rng.uniform(0.0, 0.5), transfer=rng.uniform(0.3, 0.9))
+    return System(model=model, load=load, impact=law), {"lower_1": 0.2, "upper_1": 0.0, "lower_2": 0.1, "upper_2": 0.0}
+
+
+KINDS = (cell, inelastic_cell, wall, block, stops, pair, belt, layers, cells)
+
+
+def length_of(system):
+    return {"duration": 40.0} if system.load.period is None else {"periods": 20}
+
+
+def started(system, start, shift=0.0):
+    """The motion from a start that is moved by a little, or the sentence with which it is refused."""
+    moved = {name: value + shift if value else value for name, value in start.items()}
+    speeds = moved.pop("velocity", 0.0)
+    try:
+        return saltus.simulate(system, velocity=speeds, **moved, **length_of(system))
+    except saltus.MotionError as error:
+        return str(error)
+
+
+def as_start(system, start):
+    names = system.model.coordinates
+    return {name: value for name, value in start.items() if name in names} | {f"{names[0]}_velocity": start.get("velocity", 0.0)}
+
+
+def in_node(tasks, folder):
+    file = Path(folder) / "tasks.json"
+    file.write_text(json.dumps(tasks))
+    command = [str(NODE), "--experimental-default-type=module", str(Path(__file__).parent / "agreement.mjs")]
+    done = subprocess.run(
+        [*command, (one_file.PAGE / "engine.js").as_uri(), str(file)], capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    return json.loads(done.stdout)
+
+
+def events_of(motion):
+    return [(event.time, str(event.kind)) for event in motion.events]
+
+
+def compared(system, start, motion, other):
+    """How many events of a motion agree with those of the page, all of them as far as rounding lets them be known."""
+    beside = [found for shift in (1e-14, -1e-14, 3e-14) if not isinstance(found := started(system, start, shift), str)]
+    own, page, count = events_of(motion), other["events"], 0
+    for i, (time, kind) in enumerate(own):
+        near = [events_of(each)[i] for each in beside if len(each.events) > i]
+        if not near or any(other_kind != kind for _, other_kind in near):
+            return count, False
+        spread = max(abs(other_time - time) for other_time, _ in near)
+        if spread > 1e-7:
+            return count, False
+        assert len(page) > i, (i, time, kind)
+        assert page[i][1] == kind, (i, time, kind, page[i])
+        assert abs(page[i][0] - time) <= NEAR * max(1.0, time) + 30.0 * spread, (i, time, kind, page[i], spread)
+        count += 1
+    return count, True
+
+
+def check(seed, each, kinds, folder):
+    rng = np.random.default_rng(seed)
+    tasks, known = [], []
+    for kind in kinds:
+        made = [kind(rng) for _ in range(each)]
+        wasm, description = page_parts(made[0][0])
+        motions = [
+            {"values": system.parameters, "start": as_start(system, start), **length_of(system), "at": [1.0, 5.0]}
+            for system, start in made
+        ]
+        tasks.append({"wasm": base64.b64encode(wasm).decode(), "description": description, "motions": motions})
+        known.append(made)
+    counts, whole = 0, 0
+    for made, found in zip(known, in_node(tasks, folder), strict=True):
+        for (system, start), other in zip(made, found, strict=True):
+            motion = started(system, start)
+            if isinstance(motion, str):
+                assert other["reason"] == motion
+                continue
+            count, complete = compared(system, start, motion, other)
+            counts += count
+            if complete and all(not isinstance(started(system, start, shift), str) for shift in (1e-14, -1e-14)):
+                whole += 1
+                assert other["stop"] == motion.stop
+                beside = [started(system, start, shift) for shift in (1e-14, -1e-14)]
+                ends = [np.append(np.ravel(m.position), np.ravel(m.velocity)) for m in (motion, *beside)]
+                spread = max(np.max(np.abs(end - ends[0])) for end in ends[1:])
+                assert np.max(np.abs(other["end"] - ends[0])) <= NEAR + 100.0 * spread, (system, other["end"], ends)
+    return counts, whole
+
+
+def test_motions_of_the_page_are_those_of_python(tmp_path):
+    """One kernel and one system of each of four kinds with at most one contact."""
+    counts, whole = check(1, 2, (cell, inelastic_cell, wall, block), tmp_path)
+    assert counts > 40
+    assert whole >= 4
+
+
+@pytest.mark.thorough
+def test_300_random_motions_of_all_models_are_those_of_python(tmp_path):
+    counts, whole = check(2, 34, KINDS, tmp_path)
+    assert counts > 5000
+    assert whole > 150
