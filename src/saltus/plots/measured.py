@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.plots.conventions import SINGLE_COLUMN, axes_or_new, drawing, shades
+from saltus.plots.conventions import LOOK, axes_or_new, drawing, shades
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
 @drawing
-def draw_energies(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE_COLUMN) -> Axes:
+def draw_energies(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column) -> Axes:
     """Draw the dataset of `energies`: the mean power of each part as a bar, by its role; returns the axes."""
     parts = [str(name) for name in dataset["part"].values]
     ax = axes_or_new(ax, width, 14.0 + 6.0 * len(parts))
@@ -31,7 +31,7 @@ def draw_energies(dataset: Any, *, ax: Axes | None = None, width: float = SINGLE
 
 
 @drawing
-def draw_fit(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * SINGLE_COLUMN) -> Axes:
+def draw_fit(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * LOOK.single_column) -> Axes:
     """Draw the dataset of a `fit`: what was measured as dots, the motion as lines; of impact times alone by how much the motion
     misses them; returns the axes."""
     ax = axes_or_new(ax, width, 0.62 * width)
