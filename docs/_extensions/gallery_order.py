@@ -30,7 +30,7 @@ ORDER = (
         "capture",
     ),
     *("ensemble", "stability_chart", "sensitivities", "smoothing", "two_layers", "cell_chain", "impact_pair", "record"),
-    "physical_units",
+    *("physical_units", "preloaded_stop", "at2_record", "overturning_spectrum", "harvester", "mass_chain", "animation"),
 )
 
 

@@ -3,14 +3,19 @@
 import io
 import json
 import re
+from dataclasses import replace
 
 import pytest
 import xarray as xr
 
 from saltus import ParameterError
 from saltus.files import write_dataset
+from saltus.flow import available_cores
 from saltus.systems import System
 from saltus_paper import FIGURES, reproduce
+from saltus_paper.expected_time import expected_seconds, on_the_clock
+from saltus_paper.figures.figure import EFFORTS
+from saltus_paper.toml_tables import toml_table
 
 
 def test_one_name_makes_one_figure_with_its_data_claims_and_report(tmp_path):
@@ -44,6 +49,44 @@ def test_a_picture_is_the_same_from_the_data_on_disk(tmp_path):
         for picture, source in zip(pictures, (data, stored.load()), strict=True):
             figure.draw(source).savefig(picture, dpi=60)
     assert pictures[0].getvalue() == pictures[1].getvalue()
+
+
+def test_the_time_is_told_first_and_each_picture_as_it_is_ready(tmp_path):
+    told = []
+    reproduce(["fig08"], tmp_path, progress=lambda fraction, what: told.append((fraction, what)))
+    words = [what.split(",")[0] for _, what in told]
+    assert words[0] == "measuring the speed of this machine"
+    assert re.match(r"1 parts will take about \d+ (s|min) here on \d+ core", words[1])
+    assert words[2] == f"{tmp_path / 'fig08.png'} is ready"
+    assert [fraction for fraction, _ in told] == sorted(fraction for fraction, _ in told)
+
+
+def test_the_work_of_every_part_is_known_and_a_draft_takes_a_third_at_most():
+    times = {effort: expected_seconds([figure.at(effort) for figure in FIGURES.values()], 1e5) for effort in EFFORTS}
+    table = toml_table("expected_time.toml")
+    assert set(times["standard"]) == set(table["standard"])
+    assert set(table["quick"]) == {name for name, figure in FIGURES.items() if figure.quick}
+    assert sum(times["quick"].values()) < sum(times["standard"].values()) / 3
+
+
+def test_twice_the_speed_is_half_the_time():
+    slow, fast = (expected_seconds([FIGURES["fig14"]], speed)["fig14"] for speed in (1e5, 2e5))
+    assert slow == 2 * fast
+    assert on_the_clock(1200.0 * available_cores()) == "20 min"
+    assert on_the_clock(42.0 * available_cores()) == "40 s"
+
+
+def test_a_draft_is_marked_and_made_anew_in_full(tmp_path, monkeypatch):
+    monkeypatch.setitem(FIGURES, "fig04", replace(FIGURES["fig04"], quick={"samples": 300}))
+    assert reproduce(["fig04"], tmp_path, effort="quick")[0].made
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Draft: 1 of 1 parts" in page
+    assert "samples = 300" in page
+    assert not reproduce(["fig04"], tmp_path, effort="quick")[0].made
+    assert "Draft: 1 of 1 parts" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert reproduce(["fig04"], tmp_path)[0].made
+    assert "Draft:" not in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert not reproduce(["fig04"], tmp_path, effort="quick")[0].made  # in full it is better than a draft
 
 
 def test_an_unknown_name_is_answered_with_the_near_ones(tmp_path):

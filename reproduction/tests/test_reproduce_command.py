@@ -30,24 +30,29 @@ def test_wrong_use_ends_with_status_2(saltus):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "names", "output", "force"),
+    ("arguments", "names", "output", "force", "effort"),
     [
-        ([], [], Path("results"), False),
-        (["fig04", "table1", "-o", "there", "--force"], ["fig04", "table1"], Path("there"), True),
+        ([], [], Path("results"), False, "standard"),
+        (["fig04", "table1", "-o", "there", "--force"], ["fig04", "table1"], Path("there"), True, "standard"),
+        (["fig09", "--effort", "quick"], ["fig09"], Path("results"), False, "quick"),
     ],
 )
-def test_the_options_reach_the_paper(saltus, monkeypatch, arguments, names, output, force):
+def test_the_options_reach_the_paper(saltus, monkeypatch, arguments, names, output, force, effort):
     calls = []
     monkeypatch.setattr("saltus_paper.reproduce", lambda *given: calls.append(given) or [])
     monkeypatch.setattr("saltus_paper.report_as_pdf", lambda folder: None)
     assert saltus("reproduce", *arguments).exit_code == 0
-    assert calls[0][:3] == (names, output, force)
+    assert (*calls[0][:3], calls[0][4]) == (names, output, force, effort)
 
 
 def test_an_unknown_part_is_refused(refused, tmp_path):
     said = refused("reproduce", "fig4", "-o", tmp_path)
     assert "did you mean" in said
     assert "'fig04'" in said
+
+
+def test_an_unknown_effort_is_refused(refused, tmp_path):
+    assert "'standard', 'quick'" in refused("reproduce", "fig08", "--effort", "fast", "-o", tmp_path)
 
 
 def test_an_unwritable_folder_is_refused(refused, tmp_path):
@@ -70,7 +75,7 @@ def test_the_report_is_renewed_and_a_missing_browser_told(saltus, monkeypatch, t
 def test_an_interrupt_leaves_whole_files_only(started, tmp_path):
     command = [sys.executable, "-m", "saltus", "reproduce", "fig04", "fig05", "-o", tmp_path]
     process = started(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    while process.stderr.readline() != "paper: fig05\n":
+    while not process.stderr.readline().endswith("fig05.png is ready\n"):
         assert process.poll() is None
     process.send_signal(signal.SIGINT)  # fig05 is made, and while fig04, which takes seconds, is being made
     _, err = process.communicate(timeout=120)

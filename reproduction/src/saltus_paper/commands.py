@@ -20,6 +20,9 @@ def reproduce(
     ] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="The folder to write to.")] = RESULTS,
     force: Annotated[bool, typer.Option("--force", help="Make again what is up to date.")] = False,
+    effort: Annotated[
+        str, typer.Option("--effort", help="quick: a draft of the whole report in about a quarter of the time, marked as such.")
+    ] = "standard",
     list_: Annotated[bool, typer.Option("--list", help="List the parts and stop.")] = False,
 ) -> None:
     """Compute and draw the paper: figures, tables, and every claim beside the value found here.
@@ -30,11 +33,13 @@ def reproduce(
     Example: [cyan]saltus reproduce[/] for everything
 
     Example: [cyan]saltus reproduce fig04 fig07[/] for two figures
+
+    Example: [cyan]saltus reproduce --effort quick[/] for a draft
     """
     if list_:
         list_parts()
     else:
-        reproduce_paper(names or [], output, force)
+        reproduce_paper(names or [], output, force, effort)
 
 
 def report(
@@ -53,14 +58,14 @@ def report(
     renew_report(results)
 
 
-def reproduce_paper(names: Sequence[str], output: Path, force: bool) -> None:
+def reproduce_paper(names: Sequence[str], output: Path, force: bool, effort: str = "standard") -> None:
     """Reproduce the named parts of the paper, or all, into `output`; print what was made, and the verdicts on the claims."""
     from saltus.cli import progress_bar
     from saltus_paper import FIGURES, HEADINGS, ledger, tally, with_summaries
     from saltus_paper import reproduce as made
 
     with progress_bar("paper") as progress:
-        results = made(names, output, force, progress)
+        results = made(names, output, force, progress, effort)
     console, table = Console(highlight=False), Table(box=None, show_header=False)
     for result in results:
         time = f"{result.seconds:.1f} s of processor time" if result.made else "up to date"

@@ -10,10 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from saltus import ParameterError, save
+from saltus.flow import available_cores
 from saltus.plots import style
 from saltus_paper import up_to_date as state
 from saltus_paper.claims.claim import Claim
-from saltus_paper.figures.figure import PaperFigure
+from saltus_paper.expected_time import expected_seconds, measured_speed, on_the_clock
+from saltus_paper.figures.figure import EFFORTS, PaperFigure
 from saltus_paper.output_folder import check_writable
 from saltus_paper.panel_work import compute_panels
 from saltus_paper.report.report import write_report
@@ -37,15 +39,20 @@ def reproduce(
     output: Path | str = Path("results"),
     force: bool = False,
     progress: Progress = lambda fraction, what: None,
+    effort: str = "standard",
 ) -> list[MadeFigure]:
     """Compute and draw the named parts of the paper (all if none is named) into `output`, and write the report.
 
-    What is up to date is left alone unless `force`. An interrupt leaves complete files only, and the next run goes on from there.
+    With the effort "quick" parts that take long are drafts: spectra and diagrams of fewer starts, charts of a quarter of the
+    cells. A part that is there in full stays as it is, and a later run at the standard effort replaces drafts.
+
+    What is up to date is left alone unless `force`. It is said at once how long the rest will take here, and each picture is
+    named as soon as it can be looked at. An interrupt leaves complete files only, and the next run goes on from there.
 
     Raises
     ------
     ParameterError
-        An unknown name (the error gives similar ones); an output folder that cannot be written to.
+        An unknown name or effort (the error gives similar ones); an output folder that cannot be written to.
     """
     from saltus_paper.parts import FIGURES, ORDER
 
@@ -54,9 +61,12 @@ def reproduce(
             alike = difflib.get_close_matches(name, FIGURES)
             hint = f"did you mean {' or '.join(map(repr, alike))}?" if alike else f"its parts are {', '.join(FIGURES)}"
             raise ParameterError(f"no part of the paper is called {name!r}; {hint}")
+    if effort not in EFFORTS:
+        raise ParameterError(f"effort must be one of {', '.join(map(repr, EFFORTS))}, got {effort!r}", "effort")
     output = Path(output)
     check_writable(output)
     chosen = [figure for name, figure in FIGURES.items() if not names or name in names]
+    chosen = [figure if not force and state.up_to_date(figure, output) else figure.at(effort) for figure in chosen]
     stale = {figure.name: figure for figure in chosen if force or not state.up_to_date(figure, output)}
     seconds = _make({name: stale[name] for name in dict.fromkeys((*ORDER, *stale)) if name in stale}, output, progress)
     progress(1.0, "writing the report")
@@ -68,7 +78,7 @@ def reproduce(
 def _make(figures: Mapping[str, PaperFigure], output: Path, progress: Progress) -> dict[str, float]:
     """Compute, draw and judge these parts, begun in their order; returns their seconds."""
     seconds: dict[str, float] = {}
-    progress(0.0, f"computing {len(figures)} parts")
+    expected = _announced(figures, progress)
     for name, made, computing in compute_panels({name: figure.panels(**figure.parameters) for name, figure in figures.items()}):
         figure, start = figures[name], time.process_time()
         data = figure.join(made)
@@ -77,8 +87,21 @@ def _make(figures: Mapping[str, PaperFigure], output: Path, progress: Progress) 
         claims = figure.claims(data)
         seconds[name] = computing + time.process_time() - start
         state.write(figure, output, claims, seconds[name])
-        progress(len(seconds) / len(figures), f"{name}, {figure.title}")
+        left = sum(expected[other] for other in figures if other not in seconds)
+        ready = next(output / file for file in figure.files() if not file.endswith(".nc") or len(figure.files()) == 1)
+        progress(1.0 - left / sum(expected.values()), f"{ready} is ready, {figure.title}; about {on_the_clock(left)} left")
     return seconds
+
+
+def _announced(figures: Mapping[str, PaperFigure], progress: Progress) -> dict[str, float]:
+    """The seconds of one core that each part is expected to take here; their sum is told."""
+    if not figures:
+        return {}
+    progress(0.0, "measuring the speed of this machine, after compiling if it is the first run")
+    expected = expected_seconds(figures.values(), measured_speed())
+    cores = f"{available_cores()} core{'s' if available_cores() > 1 else ''}"
+    progress(0.0, f"{len(figures)} parts will take about {on_the_clock(sum(expected.values()))} here on {cores}")
+    return expected
 
 
 def _result(figure: PaperFigure, output: Path, seconds: Mapping[str, float]) -> MadeFigure:

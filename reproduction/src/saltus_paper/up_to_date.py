@@ -92,6 +92,12 @@ def _source(module: str) -> bytes:
     return path.read_bytes() if path else b""
 
 
+def as_made(figure: PaperFigure, folder: Path) -> PaperFigure:
+    """The figure at the effort at which it was made; the standard one where there is no record."""
+    record = read(figure, folder)
+    return figure.at("quick") if record is not None and record.get("effort") == "quick" else figure
+
+
 def up_to_date(figure: PaperFigure, folder: Path) -> bool:
     """Whether every output is there, unchanged, and made by what `key` stands for."""
     record = read(figure, folder)
@@ -137,7 +143,7 @@ def write(figure: PaperFigure, folder: Path, made: Iterable[Claim], seconds: flo
     """
     files = {name: fingerprint(folder / name) for name in figure.files()}
     versions = {name: version(name) for name in ("saltus", *PACKAGES)}
-    record = {"key": key(figure), "files": files, "seconds": round(seconds, 1), "versions": versions}
+    record = {"key": key(figure), "files": files, "seconds": round(seconds, 1), "versions": versions, "effort": figure.effort}
     record["claims"] = [claim.to_dict() for claim in made]
     saltus.save(folder / FOLDER / f"{figure.name}.json", json.dumps(record, indent=1))
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -36,7 +38,7 @@ FILLINGS: dict[str, tuple[str | None, str, str, str]] = {
     "several_motions": (None, "......", "white", "several motions"),
     "motions_and_chaos": (None, "//////", LOOK.ink, "chaos beside motions"),
     "chaos": ("#8c8c8c", "//////", "white", "chaos alone"),
-    "long": ("#dedede", "------", LOOK.ink, "long period, or slow"),
+    "long": ("#dedede", "------", LOOK.ink, "long period, or unsettled"),
     "quasi_periodic": ("#dedede", "||||||", LOOK.ink, "quasi-periodic"),
     "undecided": ("#dedede", "xxxxxx", LOOK.ink, "undecided"),
 }
@@ -48,6 +50,8 @@ WHITE_GROUND = [Stroke(linewidth=2.9, foreground="white"), Normal()]  # so that 
 THIN_GROUND = [Stroke(linewidth=1.0, foreground="white", alpha=0.6), Normal()]
 STATIC_LINE: dict[str, Any] = {"color": LOOK.unstable, "lw": 1.4}
 PRINTED_LINE: dict[str, Any] = {"color": LOOK.unstable, "lw": 1.0, "ls": (0, (1, 1.2))}  # the paper's border where it is wrong
+SHORTEST_CURVE = 3.0  # A curve, or a heavy part of one, that is shorter than this many cells is left out: it would be a speck.
+SMOOTH = 0.1  # The largest motion changes smoothly between cells that differ by less than this share of the limit.
 LINE_LIMIT: dict[str, Any] = {"color": LOOK.limit, "lw": 0.9}
 DOT: dict[str, Any] = {"linestyle": "none", "marker": ".", "color": LOOK.ink, "markersize": 2.0, "markeredgewidth": 0.0}
 CROSS: dict[str, Any] = {"linestyle": "none", "marker": "x", "color": LOOK.unstable}
@@ -82,7 +86,10 @@ def draw_lines(ax: Any, tree: Any) -> int:
     chart = tree["chart"].to_dataset()
     for curve in border_curves(tree):
         x, y, style = curve["horizontal"].values, curve["vertical"].values, BORDERS[str(curve.attrs["kind"])]
-        beside = _is_beside_rest(chart, x, y)
+        cells = _in_cells(chart, x, y)
+        if np.ptp(cells, axis=1).max() < SHORTEST_CURVE:
+            continue
+        beside = _long_runs(_is_beside_rest(chart, cells), cells)
         ax.plot(x, y, **INSIDE, ls=style, path_effects=THIN_GROUND, zorder=4)
         heavy = np.where(beside, x, np.nan)
         ax.plot(heavy, np.where(beside, y, np.nan), **BESIDE_REST, ls=style, path_effects=WHITE_GROUND, zorder=5)
@@ -91,13 +98,24 @@ def draw_lines(ax: Any, tree: Any) -> int:
     return draw_ends(ax, chart, tree["borders"]["ends"].to_dataset())
 
 
-def _is_beside_rest(chart: Any, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+def _in_cells(chart: Any, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Points in units of cells, columns and rows, (2, n)."""
+    axes = ((x, "horizontal"), (y, "vertical"))
+    return np.array([np.interp(values, chart[name].values, np.arange(chart.sizes[name])) for values, name in axes])
+
+
+def _long_runs(marked: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """The marked points of a curve without those runs of them that are shorter than `SHORTEST_CURVE` cells."""
+    steps = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(int)))
+    kept = np.zeros_like(marked)
+    for first, last in steps.reshape(-1, 2):
+        kept[first:last] = np.ptp(cells[:, first:last], axis=1).max() >= SHORTEST_CURVE
+    return kept
+
+
+def _is_beside_rest(chart: Any, cells: np.ndarray) -> np.ndarray:
     """Whether, among the four cells about each of these points, one has rest alone and one has something else."""
-    resting = _resting(chart)
-    columns, rows = (
-        np.interp(values, chart[name].values, np.arange(chart.sizes[name]))
-        for values, name in ((x, "horizontal"), (y, "vertical"))
-    )
+    resting, (columns, rows) = _resting(chart), cells
     corners = [
         resting[np.clip(side(rows).astype(int), 0, len(resting) - 1), np.clip(end(columns).astype(int), 0, resting.shape[1] - 1)]
         for side in (np.floor, np.ceil)
@@ -138,7 +156,7 @@ def draw_chart(ax: Any, chart: Any, top: float | None = None) -> Any:
         rows, columns = np.nonzero(of["beyond_kinematic"])
         ax.plot(x[columns], y[rows], **CROSS, markersize=1.5, markeredgewidth=0.3, zorder=3)
     if "beyond_line" in of:
-        _outline(ax, *edges, of["beyond_line"])
+        _line_limit(ax, chart)
     return cells
 
 
@@ -179,13 +197,30 @@ def _hatch(ax: Any, x: np.ndarray, y: np.ndarray, where: np.ndarray, hatch: str,
         ax.contourf(x, y, where.astype(float), levels=[0.5, 1.5], colors="none", hatches=[hatch], zorder=2)
 
 
-def _outline(ax: Any, x: np.ndarray, y: np.ndarray, where: np.ndarray) -> None:
-    """A green line about the cells, along their edges."""
-    padded = np.pad(where, 1, mode="edge").astype(int)
-    across, down = np.diff(padded, axis=1)[1:-1], np.diff(padded, axis=0)[:, 1:-1]
-    lines = [((x[j], y[i]), (x[j], y[i + 1])) for i, j in np.argwhere(across)]
-    lines += [((x[j], y[i]), (x[j + 1], y[i])) for i, j in np.argwhere(down)]
-    ax.add_collection(LineCollection(lines, colors=LOOK.limit, linewidths=0.9, zorder=4))
+def _line_limit(ax: Any, chart: Any) -> None:
+    """A green line where the largest amplitude is that of the straight line, between cells over which it changes smoothly.
+
+    Where it jumps, the border is the curve on which the larger motion ends, which is drawn as such.
+    """
+    amplitude = chart["amplitude"].transpose("vertical", "horizontal").values
+    limit = math.pi - float(json.loads(chart.attrs["system"])["model"]["beta0"])
+    beside = np.stack([amplitude[:-1, :-1], amplitude[:-1, 1:], amplitude[1:, 1:], amplitude[1:, :-1]])
+    spread = np.ptp(beside, axis=0)
+    known = np.isfinite(spread)
+    usual = float(np.median(spread[known])) if known.any() else 0.0
+    smooth = known & (spread < max(SMOOTH * limit, 4 * usual)) & (beside.min(axis=0) < limit) & (beside.max(axis=0) >= limit)
+    x, y = chart["horizontal"].values, chart["vertical"].values
+    lines = [_crossing(beside[:, i, j] - limit, x[j : j + 2], y[i : i + 2]) for i, j in np.argwhere(smooth)]
+    ax.add_collection(LineCollection(lines, colors=LOOK.limit, linewidths=0.9, zorder=4, capstyle="round"))
+
+
+def _crossing(excess: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Where a number given at the corners of a cell, anticlockwise from the lower left, is 0 along its sides, (2 or 4, 2)."""
+    corners = np.array([[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]])
+    after, ahead = np.roll(excess, -1), np.roll(corners, -1, axis=0)
+    crossed = (excess < 0) != (after < 0)
+    share = (excess[crossed] / (excess[crossed] - after[crossed]))[:, None]
+    return np.asarray(corners[crossed] + share * (ahead[crossed] - corners[crossed]))
 
 
 def draw_static(ax: Any, static: Any) -> None:
@@ -241,19 +276,23 @@ def _line_handles(curves: Iterable[Any], static: bool, rest: bool) -> list[Any]:
     kinds = {str(curve.attrs["kind"]) for curve in curves}
     handles = [
         Line2D([], [], **STATIC_LINE, label="quasi-static border"),
-        Line2D([], [], **PRINTED_LINE, label=r"$\widehat{\mathcal{H}}_{cr}^{QS}$ where it is not"),
+        Line2D([], [], **PRINTED_LINE, label=r"$\widehat{\mathcal{H}}_{cr}^{QS}$, not the border here"),
     ]
     exact = [
         Line2D([], [], color=LOOK.ink, lw=0.7, ls=BORDERS[kind], label=BORDER_NAMES[kind]) for kind in BORDERS if kind in kinds
     ]
-    heavy = [Line2D([], [], **BESIDE_REST, label="beside rest alone")] if exact and rest else []
+    heavy = [Line2D([], [], **BESIDE_REST, label="border of rest alone")] if exact and rest else []
     return (handles if static else []) + heavy + exact
 
 
-def chart_legend(figure: Any, charts: Sequence[Any], curves: Sequence[Any], closed_form: bool = False) -> None:
+def chart_legend(
+    figure: Any, charts: Sequence[Any], curves: Sequence[Any], closed_form: bool = False, dots: bool = False
+) -> None:
     """A legend of the lines and fillings, below all panels."""
     handles = _line_handles(curves, static=True, rest=True)
     handles.append(Line2D([], [], **LINE_LIMIT, label=r"max$|\theta|=\pi-\beta_0$"))
+    if dots:
+        handles.append(Line2D([], [], **DOT | {"markersize": 4.0}, label="end of motions, no curve"))
     handles += _fillings(charts)
     if closed_form:
         handles.append(Line2D([], [], ms=3, label="closed form, high frequency", **CLOSED_FORM))

@@ -38,7 +38,7 @@ class ResponseSettings:
 
     dotted_values: int = 25  # Simulated motions are drawn at about this many values: more dots would hide the lines.
     letters: float = 880.0  # The number of letters of size one point that fit beside one another into a double column.
-    mark_distance: float = 1.5  # Of marks of one kind nearer to one another than this, in mm, only some are drawn.
+    mark_distance: float = 1.7  # Of marks nearer to one another than this, in mm, only the first is drawn, by the order of MARKS.
 
 
 SETTINGS = ResponseSettings()
@@ -110,19 +110,19 @@ def line_style(stable: bool, validity: ModelValidity, weight: float = 1.0) -> di
 
 
 def draw_special(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: float = 1.0) -> None:
-    """Small marks by kind at the special points inside the axes, the closest ones of a kind thinned out."""
+    """Small marks by kind at the special points inside the axes, the closest ones thinned out."""
     box = ax.get_window_extent()
     unit = np.array([box.width, box.height]) / ax.figure.dpi * 25.4
     low, high = np.array([ax.get_xlim(), ax.get_ylim()]).T
+    kept: list[np.ndarray] = []
     for kind, style in MARKS.items():
-        places = special_places(spectrum, kind, quantity) / np.array([1.0, scale])
+        places, first = special_places(spectrum, kind, quantity) / np.array([1.0, scale]), len(kept)
         inside = ((places >= low) & (places <= high)).all(axis=1)
-        kept: list[np.ndarray] = []
         for place in places[inside]:
             if all(np.linalg.norm((place - other) / (high - low) * unit) > SETTINGS.mark_distance for other in kept):
                 kept.append(place)
-        if kept:
-            ax.plot(*np.array(kept).T, linestyle="none", zorder=5, **_mark(style))
+        if len(kept) > first:
+            ax.plot(*np.array(kept[first:]).T, linestyle="none", zorder=5, **_mark(style))
 
 
 def special_places(spectrum: Any, kind: str, quantity: str = "amplitude") -> np.ndarray:
@@ -155,7 +155,7 @@ def note_missed(ax: Any, spectrum: Any) -> None:
     ended = 100 * float(spectrum.attrs.get("ended_share", 0.0))
     if np.isfinite(share):
         cut = f"; ended at a limit: {ended:.2g} %" if ended > 0 else ""
-        ax.set_title(f"missed: {share:.2g} % ({low:.2g} to {high:.2g}){cut}", loc="right", pad=4, fontsize=7)
+        ax.set_title(f"missed: {share:.2g} % ({low:.2g} to {high:.2g} %){cut}", loc="right", pad=4, fontsize=7)
 
 
 def draw_bands(ax: Any, spectrum: Any) -> None:
@@ -227,7 +227,7 @@ def missed_states(spectra: list[Any]) -> str | None:
     """The explanation of the share that `note_missed` writes above the panels; None if no sample was taken."""
     if not any("missed_low" in spectrum.attrs for spectrum in spectra):
         return None
-    return "missed: random states that end on a motion that is not drawn, and the 95 % interval of their share"
+    return "missed: the share of random starts that end on an attractor not drawn, with its 95 % interval"
 
 
 def line_handles(branches: list[Any]) -> tuple[list[Any], list[str], dict[Any, Any]]:

@@ -263,4 +263,4 @@ def measure(data: Any) -> dict[str, Measured]:
     }
 
 
-FIGURE = paper_figure("both_layers", compute=compute, draw=draw, measure=measure)
+FIGURE = paper_figure("both_layers", quick={"size": 13}, compute=compute, draw=draw, measure=measure)

@@ -80,7 +80,7 @@ def _bars(ax: Any, group: Any) -> None:
     columns = zip(group["mass_ratio"].values, group["e"].values, group["transfer"].values, strict=True)
     ax.set_yticks(places, [f"{m:g}, {e:g}, {g:g}" for m, e, g in columns])
     ax.tick_params(axis="y", labelsize=6)
-    ax.set_ylabel("$m$, $e$, $g$")
+    ax.set_ylabel("mass $m$, restitution $e$, transfer $g$", fontsize=7)
     ax.set_xlim(0.0, 1.0)
     ax.set_xlabel("share of the reduced attractors, Fig. 9")
 

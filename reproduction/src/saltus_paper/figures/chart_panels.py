@@ -50,6 +50,7 @@ def chart_figure(
         join=partial(joined, what="stability charts under load (i)"),
         draw=partial(_draw, height=height),
         measure=measure,
+        quick={"size": 36, "curves": 1},
         module=module,
     )
 
@@ -78,10 +79,10 @@ def _draw(data: Any, height: float) -> Any:
     figure = new_figure(LOOK.double_column, height)
     axes = figure.subplots(-(-len(panels) // 2), 2, squeeze=False).ravel()
     top = max(float(np.nanmax(tree["chart"]["amplitude"].values, initial=1e-3)) for _, tree in panels)
-    cells, fast = None, False
+    cells, fast, dots = None, False, 0
     for ax, (name, tree) in zip(axes, panels, strict=False):
         cells = draw_chart(ax, tree["chart"].to_dataset(), top) or cells
-        draw_lines(ax, tree)
+        dots += draw_lines(ax, tree)
         fast |= _closed_form(ax, tree)
         panel_label(ax, name)
         attrs = tree.attrs
@@ -99,7 +100,7 @@ def _draw(data: Any, height: float) -> Any:
         )
         bar.set_label(r"largest $\max_\tau|\theta|$ of the stable motions (rad)")
     charts = [tree["chart"].to_dataset() for _, tree in panels]
-    chart_legend(figure, charts, [curve for _, tree in panels for curve in border_curves(tree)], fast)
+    chart_legend(figure, charts, [curve for _, tree in panels for curve in border_curves(tree)], fast, dots > 0)
     return figure
 
 

@@ -43,7 +43,7 @@ def draw(data: Any) -> Any:
     for ax, name in zip(axes, "abc", strict=True):
         draw_portrait(ax, data[name], (-2.45, 2.45), (-0.95, 0.95))
         panel_label(ax, name)
-    axes[0].set_ylabel(r"$\dot\theta$")
+        ax.set_ylabel(r"$\dot\theta$")
     return figure
 
 

@@ -95,13 +95,13 @@ def closed_loop(ax: Any, tree: Any) -> None:
     if not closed:
         return
     loop, scale = max(closed, key=lambda branch: float(branch["parameter"].max())), tree.attrs["scale"]
-    inset = ax.inset_axes((0.36, 0.55, 0.25, 0.40))
+    inset = ax.inset_axes((0.335, 0.52, 0.215, 0.40))
     inset.set_xscale("log")
     inset.set_xlim(0.9 * float(loop["parameter"].min()), 1.2 * float(loop["parameter"].max()))
     inset.set_ylim(0.0, 1.1 * float(loop["amplitude"].max()) / scale)
     inset.set_xticks([2, 5, 10], ["2", "5", "10"])
     inset.minorticks_off()
-    inset.tick_params(labelsize=6, length=2, pad=1.5)
+    inset.tick_params(labelsize=7, length=2, pad=1.5)
     draw_limits(inset, tree.attrs["limits"], scale)
     draw_branches(inset, tree, scale=scale, weight=0.8)
     draw_special(inset, tree, scale=scale)
@@ -111,7 +111,7 @@ def zoom(ax: Any, tree: Any, window: tuple[float, float]) -> None:
     """An inset with the superharmonic resonances."""
     scale = tree.attrs["scale"]
     top = highest(tree, *window) / scale
-    draw_zoom(ax, tree, (0.40, 0.36), (*window, 0.45 * top, 1.06 * top), scale=scale)
+    draw_zoom(ax, tree, (0.38, 0.34), (*window, 0.45 * top, 1.06 * top), scale=scale)
 
 
 def measure(data: Any) -> dict[str, Measured | None]:
@@ -135,4 +135,4 @@ def static_unit(panels: Mapping[float, Any]) -> Measured:
     return measured(max(residuals, default=np.inf), panels=rows)
 
 
-FIGURE = paper_figure("fig09", panels=panels, join=join, draw=draw, measure=measure)
+FIGURE = paper_figure("fig09", quick={"effort": "quick"}, panels=panels, join=join, draw=draw, measure=measure)

@@ -86,4 +86,4 @@ def measure(data: Any) -> dict[str, Measured | None]:
     return {**found, "fig10-validity": validity("Fig. 10", drawn)}
 
 
-FIGURE = paper_figure("fig10", panels=panels, join=join, draw=draw, measure=measure)
+FIGURE = paper_figure("fig10", quick={"effort": "quick"}, panels=panels, join=join, draw=draw, measure=measure)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from operator import itemgetter
 from typing import Any
@@ -11,6 +11,8 @@ from typing import Any
 from saltus_paper.claims.claim import Claim, Measures, judge
 from saltus_paper.panel_work import Panels, compute_panels
 from saltus_paper.toml_tables import toml_table
+
+EFFORTS = ("standard", "quick")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -34,7 +36,15 @@ class PaperFigure:
     draw: Callable[[Any], Any] | None = None
     table: Callable[[Any], str] | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
+    quick: Mapping[str, Any] = field(default_factory=dict)  # parameters of a draft; none where the part is quick anyway
+    effort: str = "standard"
     module: str  # the module that computes it
+
+    def at(self, effort: str) -> PaperFigure:
+        """The part at an effort of `EFFORTS`: a draft is a part of its own, unless the part is quick anyway."""
+        if effort == self.effort or not self.quick:
+            return self
+        return replace(self, parameters={**self.parameters, **self.quick}, effort=effort)
 
     def compute(self, **parameters: Any) -> Any:
         """The data of all panels together, for parameters that need not be the paper's."""

@@ -63,6 +63,7 @@ def force_figure(
         join=partial(joined, what="bifurcation diagram under load (i)"),
         draw=partial(_draw, frequencies=frequencies, zoomed=zoomed),
         measure=measure,
+        quick={"effort": "quick"},
         module=module,
     )
 

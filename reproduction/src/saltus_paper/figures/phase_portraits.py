@@ -145,7 +145,7 @@ def draw_portrait(ax: Any, data: Any, xlim: tuple[float, float], ylim: tuple[flo
         limit_lines(ax, float(data[name]), rf"${np.rad2deg(float(data[name])):.0f}^\circ$")
     borders = data.isel(separatrix=data["separates"].values.astype(bool))
     for theta, velocity in zip(borders["separatrix_theta"].values, borders["separatrix_velocity"].values, strict=True):
-        ax.plot(theta, velocity, zorder=3, **LOOK.separatrix_line)
+        ax.plot(theta, velocity, zorder=1.5, **LOOK.separatrix_line | {"linewidth": 0.8})
     for theta, velocity, hide in zip(data["theta"].values, data["velocity"].values, _hidden(data), strict=True):
         shown = np.where(hide, np.nan, velocity)
         ax.plot(theta, shown, color=LOOK.stable, lw=0.7, zorder=2)

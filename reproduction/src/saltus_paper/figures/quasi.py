@@ -58,7 +58,7 @@ def draw(data: Any) -> Any:
         column[1].set_xlabel(r"frequency $\Omega$")
     axes[0, 0].set_ylabel(r"$\theta$ at phase 0 (rad)")
     axes[1, 0].set_ylabel(r"largest exponent $\lambda$")
-    axes[1, -1].legend(loc="upper right")
+    axes[1, 0].legend(loc="upper right", handletextpad=0.2, borderaxespad=0.2)  # where nothing is drawn
     return figure
 
 
@@ -112,4 +112,4 @@ def _resolved(panel: Any) -> Measured:
     )
 
 
-FIGURE = paper_figure("quasi", panels=panels, join=join, draw=draw, measure=measure)
+FIGURE = paper_figure("quasi", quick={"count": 15}, panels=panels, join=join, draw=draw, measure=measure)

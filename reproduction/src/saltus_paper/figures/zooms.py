@@ -11,6 +11,7 @@ from saltus.plots import LOOK, draw_response, smooth_lines
 
 PLACES = 24  # the number of places along each side of the axes that are tried for an inset
 MARGIN = 0.05  # the ticks of an inset take this share of the axes
+LINE = 5.0  # to cover a line is as bad as to cover so many points of a branch
 WEIGHT = 0.65  # lines that are drawn larger have this share of their width, as they lie closer together
 
 
@@ -26,7 +27,7 @@ def draw_zoom(
     inset = ax.inset_axes(free_place(ax, spectrum, size, quantity, scale))
     inset.set_xlim(window[:2])
     inset.set_ylim(window[2:])
-    inset.tick_params(labelsize=6, length=2, pad=1.5)
+    inset.tick_params(labelsize=7, length=2, pad=1.5)
     inset.locator_params(nbins=3)
     draw_response(inset, spectrum, quantity, scale, WEIGHT)
     box = ax.indicate_inset_zoom(inset, edgecolor=LOOK.ink, linewidth=0.4, alpha=1.0)
@@ -72,10 +73,10 @@ def free_place(
     for y in np.linspace(0.07, 0.96 - size[1], PLACES):
         for x in np.linspace(0.07, 0.98 - size[0], PLACES):
             inside = (np.abs(points - np.array([x + size[0] / 2, y + size[1] / 2])) < np.array(size) / 2 + margin).all(axis=1)
-            crossed = sum(y - margin < line < y + size[1] + margin for line in lines)
+            crossed = sum(y - margin < line < y + size[1] + 0.01 for line in lines)
             hidden = int(((bands[:, 0] < x + size[0]) & (bands[:, 1] > x)).sum())
-            # It is better to cover a line or a band than a branch, and better to be high than low.
-            cost = inside.sum() + 0.5 * (crossed + hidden) - 1e-3 * y
+            # It is better to cover a band than a branch or a line, and better to be high than low.
+            cost = inside.sum() + LINE * crossed + 0.5 * hidden - 1e-3 * y
             if cost < least:
                 best, least = (x, y), cost
     return (*best, *size)

@@ -31,7 +31,7 @@ def write_report(figures: Iterable[PaperFigure], folder: Path, known: Mapping[st
 
     `known` holds the claims of the figures, by name, that are known to be up to date.
     """
-    figures = list(figures)
+    figures = [state.as_made(figure, folder) for figure in figures]
     present = {}
     for figure in figures:
         if figure.name in known:
@@ -55,11 +55,12 @@ def report_from_results(folder: Path | str) -> list[str]:
     from saltus_paper.parts import FIGURES
 
     folder = Path(folder)
-    present = {figure: state.claims(figure, folder) for figure in FIGURES.values() if state.intact(figure, folder)}
+    figures = [state.as_made(figure, folder) for figure in FIGURES.values()]
+    present = {figure: state.claims(figure, folder) for figure in figures if state.intact(figure, folder)}
     if not present:
         raise ParameterError(f"{folder} holds no results of `saltus reproduce`; name the folder in which they are")
     check_writable(folder)
-    _write(report_content(FIGURES.values(), present, folder), folder)
+    _write(report_content(figures, present, folder), folder)
     return [figure.name for figure in present]
 
 

@@ -42,6 +42,7 @@ class ReportPart:
     seconds: float
     versions: str
     stale: bool  # whether it was made by other sources than the present ones
+    draft: bool  # whether it was made with less effort than the paper needs
     data: DataTables
     picture: EmbeddedPicture | None
     table: list[list[str]]  # a table of the paper; its first row are the headings
@@ -88,6 +89,11 @@ class ReportContent:
     charts: list[tuple[str, ...]] = field(default_factory=list)
     shares: dict[str, list[list[str]]] = field(default_factory=dict)  # tables of both layers by figure
     portraits: list[tuple[str, int, int]] = field(default_factory=list)
+
+    @property
+    def drafts(self) -> list[ReportPart]:
+        """The parts that were made with less effort than the paper needs."""
+        return [part for part in self.parts if part.draft]
 
     @property
     def parts(self) -> list[ReportPart]:
@@ -146,6 +152,7 @@ def _part(figure: PaperFigure, claims: list[Claim], folder: Path, picture: Embed
         seconds=float(record["seconds"]),
         versions=", ".join(f"{name} {number}" for name, number in versions.items()),
         stale=record.get("key") != state.key(figure),
+        draft=figure.effort != "standard",
         data=data_tables(folder / f"{figure.name}.nc"),
         picture=picture,
         table=_markdown_rows((folder / f"{figure.name}.md").read_text(encoding="utf-8", errors="replace"))

@@ -323,7 +323,13 @@ def _tangent(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
 
 def edges_function(roots: Sequence[Expr]) -> WrittenFunction:
     """The function `edges(parameters, out)`, which fills an array with the values of expressions of the parameters."""
-    return WrittenFunction("edges", memory.CONSTANTS, Places(("parameters", "out"), ENV), SCALAR, [Case(tape(roots, {}), [("out", i) for i in range(len(roots))])])
+    return WrittenFunction(
+        "edges",
+        memory.CONSTANTS,
+        Places(("parameters", "out"), ENV),
+        SCALAR,
+        [Case(tape(roots, {}), [("out", i) for i in range(len(roots))])],
+    )
 
 
 def _table(name: str, places: Places, roots: list[Expr], known: dict[Expr, int]) -> WrittenFunction:

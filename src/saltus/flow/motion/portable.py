@@ -120,7 +120,7 @@ class PortableMotion:
         }
 
     def _records(self) -> dict[str, Any]:
-        """What the load reads of tables in time: of pulses, which clock it is; of records, their own breakpoints and polynomials."""
+        """What the load reads of tables in time: of pulses the clock; of records their breakpoints and polynomials."""
         rows: list[dict[str, Any]] = []
         for path, order in self.run.trace.records:
             if path in self._pulses:
