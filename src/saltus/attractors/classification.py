@@ -247,8 +247,8 @@ def _settled(case: _Case, ends: Recurrence, start: np.ndarray) -> Verdict | None
     every = f"every {period} forcing periods" if period > 1 else ""
     if not found.sound and (other := _period_by_the_judge(case, ends)) not in (None, period):
         again = f"every {other}" if other else "not at all"
-        numbers = {"seen": f"{seen} {every}", "tol": case.tol, "looser": JUDGEMENT.tol, "other": again}
-        return case.undecided(Reason.ROUNDING, ends, numbers)
+        facts: dict[str, Any] = {"seen": f"{seen} {every}", "tol": case.tol, "looser": JUDGEMENT.tol, "other": again}
+        return case.undecided(Reason.ROUNDING, ends, facts)
     return _on_orbit(case, ends, found, f"{seen} {every}".rstrip())
 
 
