@@ -264,7 +264,7 @@ CEILINGS = {
     "files that the architecture page names for a motion": 13,
     "isinstance of equations": 1,
     "asking a model of which class it is": 80,
-    "arguments of a compiled function": 11,
+    "arguments of a compiled function": 6,
     "public names behind doors": 470,
     "tuned numbers": 524,
     "files of the library": 263,

@@ -31,15 +31,15 @@ import numpy as np
 
 from saltus.flow.contacts.frictions import choose_slides, hold_frictions, slides_so
 from saltus.flow.contacts.impacts import (
+    apply_impulses,
     bring_to_rest,
     closed_bits,
     contact_position,
-    couple,
     fill_after,
+    fill_contact_matrices,
     gap_series,
     hold_coordinates,
     impact_impulses,
-    push,
     record_contact_event,
     settle_contact,
 )
@@ -48,9 +48,9 @@ from saltus.flow.contacts.tangent import (
     clear_shifts,
     closing_columns,
     fill_slopes,
+    gap_derivative,
     hold_columns,
     impulse_columns,
-    lift,
     move_columns,
     note_shifts,
     note_velocities,
@@ -143,7 +143,7 @@ def block_of(motion, hit, backwards):
     bits."""
     own, count = motion.own, motion.contacts.shape[0]
     joined, start, grows, block = np.zeros(own, np.bool_), 0, True, 0
-    couple(motion)
+    fill_contact_matrices(motion)
     while hit >> start != 1 if backwards else not hit >> start & 1:
         start += 1
     joined[motion.contacts[start, ContactColumn.COORDINATE]] = True
@@ -169,7 +169,7 @@ def block_of(motion, hit, backwards):
 def impact_of(motion, t, hit):
     """Apply the impact law to the contacts in `hit` and to those that are closed; an `ImpactDetail`, or -1 if it fails."""
     count, detail = motion.contacts.shape[0], int(ImpactDetail.REGULAR)
-    regular, chosen = couple(motion), hit
+    regular, chosen = fill_contact_matrices(motion), hit
     for i in range(count):
         chosen |= motion.contacts[i, ContactColumn.CLOSED] << i
     if motion.columns > 0:
@@ -182,7 +182,7 @@ def impact_of(motion, t, hit):
     acts = impact_impulses(motion, chosen, motion.rates) if regular else -1
     if acts < 0:
         return -1
-    push(motion)
+    apply_impulses(motion)
     for i in range(count):
         if chosen >> i & 1:
             settle_contact(motion, i, motion.rates[i])
@@ -326,11 +326,11 @@ def rests_in_a_row(motion, t, near):
             expand(motion, t, 1.0, 0)
             move_columns(motion, -1.0)
             clear_shifts(motion)
-            couple(motion)
+            fill_contact_matrices(motion)
             fill_slopes(motion)
             for i in range(motion.contacts.shape[0]):
                 for j in range(motion.columns if jumped & block & 1 << i else 0):
-                    motion.shifts[j] = -lift(motion, j, i) / motion.rates[i]
+                    motion.shifts[j] = -gap_derivative(motion, j, i) / motion.rates[i]
             move_columns(motion, 1.0)
         near, jumped = near & ~block, jumped & ~block
         bring_to_rest(motion, block)

@@ -21,8 +21,9 @@ ENDS = 1e-6  # share of a segment at both of its ends in which no extremum is lo
 
 
 @lean_jit
-def least_of(c, order, h, t, poly, roots, seen, place):
-    """Update the least inner minimum at `place` of `seen`, and its time, with the minima of a series within a step."""
+def find_minimum(motion, c, t, h):
+    """Update `motion.least`, a least inner minimum and its time, with the minima of a series within a step."""
+    order, poly, roots, least = motion.order, motion.polynomial, motion.turns, motion.least
     size = abs(c[0])
     for k in range(1, order + 1):
         poly[k - 1] = k * c[k] * h**k
@@ -31,14 +32,15 @@ def least_of(c, order, h, t, poly, roots, seen, place):
         turn, value = 0.0, horner(c, order, roots[i] * h)
         for k in range(order - 1, 0, -1):
             turn = turn * roots[i] + k * poly[k]
-        if turn > 0.0 and value < seen[place]:
-            seen[place], seen[place + 1] = value, t + roots[i] * h
+        if turn > 0.0 and value < least[0]:
+            least[0], least[1] = value, t + roots[i] * h
 
 
 @lean_jit
-def extremes_at_step(motion, t, h, begin, end, roots, seen, least):
+def extremes_at_step(motion, t, h, begin, end, seen):
     """Update the extremes with a step: extrema of the coordinates, inner minima of the guards, least values of the margins."""
     order, own, count, poly = motion.order, motion.own, motion.contacts.shape[0], motion.polynomial
+    roots, least = motion.turns, motion.least
     for a in range(own):
         q, size = motion.coordinate_series[a], 0.0
         scale_gap(motion.velocity_series[a], 0, order, h, poly)
@@ -56,7 +58,7 @@ def extremes_at_step(motion, t, h, begin, end, roots, seen, least):
         else:
             gap_series(motion, i, contact_position(motion, i), order, guard)
         least[0], least[1] = np.inf, 0.0
-        least_of(guard, order, h, t, poly, roots, least, 0)
+        find_minimum(motion, guard, t, h)
         place = SegmentExtremes.FORCE if motion.contacts[i, ContactColumn.CLOSED] == 1 else SegmentExtremes.GAP
         inside = ENDS * (end - begin) < least[1] - begin < (1.0 - ENDS) * (end - begin)
         if inside and least[0] < seen[place]:
@@ -64,7 +66,7 @@ def extremes_at_step(motion, t, h, begin, end, roots, seen, least):
     for j in range(count, motion.margin_count):
         place, m = SegmentExtremes.MARGINS + j - count, motion.margin_series[j]
         least[0] = min(m[0], horner(m, order, h))
-        least_of(m, order, h, t, poly, roots, least, 0)
+        find_minimum(motion, m, t, h)
         seen[place] = min(seen[place], least[0])
 
 

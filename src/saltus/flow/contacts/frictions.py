@@ -109,7 +109,7 @@ def first_friction(motion, count, h, whole):
 
 
 @lean_jit
-def reach(motion, count, t, k, which, later):
+def reach_ground_speed(motion, count, t, k, which, later):
     """Take the motion, with the tangent's columns, to the instant at which a friction's guard is 0.
 
     If that is the sliding speed, it is set to exactly 0; the instant moves by dt = -(z - w_c) / a.

@@ -79,7 +79,7 @@ def contact_position(motion, i):
 
 
 @lean_jit
-def couple(motion):
+def fill_contact_matrices(motion):
     """Fill `NUMBERS`, `INVERSE`, `COUPLING`, `GAPS` and `RATES` of `solver` at the present state; False if the mass matrix is
     singular."""
     own, count, signs = motion.own, motion.contacts.shape[0], motion.signs
@@ -157,7 +157,7 @@ def impact_impulses(motion, chosen, rates):
 
 
 @lean_jit
-def push(motion):
+def apply_impulses(motion):
     """Add the effect of the impulses to the velocities."""
     for i in range(motion.own):
         for j in range(motion.contacts.shape[0]):
@@ -349,7 +349,7 @@ def bring_to_rest(motion, near):
         if near >> i & 1:
             motion.impulses[i] = motion.tried[row]
             row += 1
-    push(motion)
+    apply_impulses(motion)
     for i in range(count):
         if near >> i & 1:
             settle_contact(motion, i, 0.0)

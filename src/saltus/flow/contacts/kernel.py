@@ -23,7 +23,7 @@ from saltus.flow.contacts.frictions import (
     first_friction,
     friction_step_size,
     hold_frictions,
-    reach,
+    reach_ground_speed,
     record_slides,
     slide_bits,
     slides_before,
@@ -34,8 +34,8 @@ from saltus.flow.contacts.impacts import (
     closed_bits,
     contact_position,
     contact_step_size,
-    couple,
     fill_after,
+    fill_contact_matrices,
     frozen_accumulation,
     gap_series,
     hold_coordinates,
@@ -82,7 +82,7 @@ def free_pulls(motion, t):
 def end_accumulation_of(motion, t):
     """Bring contacts to rest whose impacts accumulate soon; returns the end of the accumulation, or t if there is none."""
     count, tol = motion.contacts.shape[0], motion.tolerance
-    if not couple(motion):
+    if not fill_contact_matrices(motion):
         return t
     slowest, last = slow_impacts(tol), -1
     for i in range(count):
@@ -158,7 +158,7 @@ def decide_contacts(motion):
     event_shifts(motion)
     settled = end_accumulation_of(motion, t)
     candidates, before = closed_bits(motion), slides_before(motion)
-    couple(motion)
+    fill_contact_matrices(motion)
     still = undecided(motion)
     if (candidates or still) and not choose_closed(motion, candidates, still, t):
         note_ties(motion, candidates, t)
@@ -222,7 +222,7 @@ def first_guard(motion, h, whole):
 
 
 @lean_jit
-def together(motion, hit, tau):
+def contacts_closing_with(motion, hit, tau):
     """The open contacts that close with `hit` at `tau` within the step, to within rounding, as bits."""
     order, count, bits, g = motion.order, motion.contacts.shape[0], 1 << hit, motion.gap_series
     for i in range(count):
@@ -309,7 +309,7 @@ def contact_arc(motion, target):
     tau = first * h if found or limit >= 0 else h
     bits = 0
     if hit >= 0 and motion.contacts[hit, ContactColumn.CLOSED] == 0:
-        bits = together(motion, hit, tau)
+        bits = contacts_closing_with(motion, hit, tau)
     finite = move(motion, tau)
     for i in range(motion.dof):
         for k in range(motion.order + 2, order + 2):
@@ -333,7 +333,7 @@ def contact_arc(motion, target):
         motion.mode, motion.contacts[hit, ContactColumn.RELEASED] = Mode.CONTACT, 1 if first > 0.0 else 0
     if rubs >= 0:
         fill_slopes(motion)
-        reach(motion, count, motion.time, rubs, which, first > 0.0)
+        reach_ground_speed(motion, count, motion.time, rubs, which, first > 0.0)
         motion.mode = Mode.CONTACT
     if limit >= 0:
         record_contact_event(motion, EventCode.LIMIT, 0, motion.time)
@@ -350,7 +350,7 @@ def contact_arc(motion, target):
 @lean_jit
 def begin(motion):
     """Fill the memory that depends on the contacts and on the state."""
-    couple(motion)
+    fill_contact_matrices(motion)
     hold_coordinates(motion)
     hold_frictions(motion)
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.flow.contacts.impacts import closed_bits, couple, impact_impulses, push, settle_contact
+from saltus.flow.contacts.impacts import apply_impulses, closed_bits, fill_contact_matrices, impact_impulses, settle_contact
 from saltus.flow.contacts.lane_handoff import functions_of
 from saltus.flow.contacts.lane_impacts import read_contacts, write_closed
 from saltus.flow.contacts.layout import ContactColumn
@@ -35,13 +35,13 @@ def contacts_impact(lane, hit):
     for row in range(2 * own):  # velocities follow the positions in both memories
         state[row] = lane.new_position[row]
     read_contacts(lane, contacts)
-    regular, chosen = couple(motion), hit | closed_bits(motion)
+    regular, chosen = fill_contact_matrices(motion), hit | closed_bits(motion)
     for i in range(contacts.shape[0]):
         if hit >> i & 1:
             speed = min(speed, -rates[i])
     if not regular or not speed > 0.0 or impact_impulses(motion, chosen, rates) < 0:
         return 0
-    push(motion)
+    apply_impulses(motion)
     free = (1 << own) - 1
     for i in range(contacts.shape[0]):
         if chosen >> i & 1:

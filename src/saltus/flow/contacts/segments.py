@@ -22,16 +22,16 @@ from saltus.flow.contacts.extremes import (
     gap_beside,
 )
 from saltus.flow.contacts.impacts import (
+    apply_impulses,
     contact_position,
     contact_step_size,
-    couple,
+    fill_contact_matrices,
     hold_coordinates,
     impact_impulses,
-    push,
     restitution,
 )
 from saltus.flow.contacts.layout import ContactColumn, SegmentEnd, SegmentPlan, solver_arrays
-from saltus.flow.contacts.tangent import fill_slopes, hold_columns, impulse_columns, lift, note_velocities
+from saltus.flow.contacts.tangent import fill_slopes, gap_derivative, hold_columns, impulse_columns, note_velocities
 from saltus.flow.kernel.layout import EventCode
 from saltus.flow.kernel.memory import CONTACT_SEGMENTS, ContactsSegmentParts, MotionMemory
 from saltus.flow.kernel.steps import columns_at_event, expand, move, state_arrays, step_arrays
@@ -67,7 +67,7 @@ def hold_contacts(motion, closed):
 
 
 @lean_jit
-def follow_segment(motion, begin, end, roots, seen, least):
+def follow_segment(motion, begin, end, seen):
     """Follow one segment with the given contacts closed; returns the number of steps, or 0 if it cannot be followed."""
     order, t, forwards = motion.order, begin, end >= begin
     for count in range(MOST_STEPS):
@@ -78,7 +78,7 @@ def follow_segment(motion, begin, end, roots, seen, least):
         last = natural >= abs(end - t)
         h = end - t if last else (natural if forwards else -natural)
         if seen.size > 1 and h > 0.0:
-            extremes_at_step(motion, t, h, begin, end, roots, seen, least)
+            extremes_at_step(motion, t, h, begin, end, seen)
         move(motion, h)
         if last:
             return count + 1
@@ -107,7 +107,7 @@ def given_impact(motion, hit, after):
     closed.
     """
     own, count, unit = motion.own, motion.contacts.shape[0], motion.falling_rates
-    couple(motion)
+    fill_contact_matrices(motion)
     chosen = 1 << hit
     for i in range(count):
         chosen |= motion.contacts[i, ContactColumn.CLOSED] << i
@@ -123,7 +123,7 @@ def given_impact(motion, hit, after):
             if chosen >> k & 1:
                 motion.right[i] += restitution(motion, i, k) * motion.rates[k]
     acting(motion.coupling, motion.right, count, acts, motion.block, motion.impulses)
-    push(motion)
+    apply_impulses(motion)
     for i in range(count):
         if acts >> i & 1:
             rate, place = 0.0, motion.contacts[i, ContactColumn.COORDINATE]
@@ -219,7 +219,7 @@ def guard_at_end(motion, t, kind, contact, ends, slopes):
     ends[SegmentEnd.GUARD] = sign * (motion.coordinates[place] - contact_position(motion, contact))
     ends[SegmentEnd.BY_END] = ends[SegmentEnd.RATE] = sign * motion.velocities[place]
     for j in range(motion.columns):
-        slopes[j] = lift(motion, j, contact)
+        slopes[j] = gap_derivative(motion, j, contact)
 
 
 @lean_jit
@@ -246,10 +246,10 @@ def follow_with(numbers, parts, request, results):
     motion, own = by_reference(MotionMemory(numbers, parts)), numbers.own
     plan, times, first = request.plan, request.times, request.first
     ends, columns, maps, extremes = results.ends, results.columns, results.maps, results.extremes
-    roots, nothing, least = np.zeros(motion.order + 2), np.zeros(1), np.zeros(2)
+    nothing = np.zeros(1)
     for a in range(own):
         motion.coordinates[a], motion.velocities[a] = first[a], first[own + a]
-    couple(motion)
+    fill_contact_matrices(motion)
     for s in range(plan.shape[0]):
         begin, end, kind, contact = times[s], times[s + 1], plan[s, SegmentPlan.KIND], plan[s, SegmentPlan.CONTACT]
         unit_columns(motion)
@@ -261,7 +261,7 @@ def follow_with(numbers, parts, request, results):
             extremes_at_start(motion, plan[s, SegmentPlan.HIT], seen)
             if kind < 0:
                 extremes_at_section(motion, begin, seen)
-        steps = follow_segment(motion, begin, end, roots, seen, least)
+        steps = follow_segment(motion, begin, end, seen)
         if steps == 0:
             return s
         power = plan[s, SegmentPlan.POWER]
@@ -304,5 +304,7 @@ def follow_contact_segments(numbers, env, functions, contacts, request, results)
     record, count = numbers[0], contacts.shape[0]
     state = state_arrays(record, np.zeros(2 * record.dof + record.columns))
     solver = solver_arrays(record.own, count, record.columns, 0)
-    parts = ContactsSegmentParts(state, env, env[0], functions, contacts, step_arrays(record), solver)
+    parts = ContactsSegmentParts(
+        state, env, env[0], functions, contacts, step_arrays(record), solver, np.zeros(record.order + 2), np.zeros(2)
+    )
     return follow_with(record, parts, request, results)

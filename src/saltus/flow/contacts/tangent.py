@@ -58,7 +58,7 @@ def slope(motion, j, place):
 
 
 @lean_jit
-def lift(motion, j, i):
+def gap_derivative(motion, j, i):
     """The derivative of a contact's gap along column j."""
     own, count, coordinate = motion.own, motion.contacts.shape[0], motion.contacts[i, ContactColumn.COORDINATE]
     moved = slope(motion, j, own * own + count * count + i)
@@ -129,7 +129,7 @@ def closing_columns(motion, t, hit):
             rate = motion.rates[i]
             if rate >= 0.0:
                 return ImpactDetail.NO_SPEED
-            shift = -lift(motion, j, i) / rate
+            shift = -gap_derivative(motion, j, i) / rate
             if known and abs(shift - motion.shifts[j]) > APART * (abs(shift) + abs(motion.shifts[j])):
                 shift, detail = math.nan, ImpactDetail.APART
             motion.shifts[j], known = shift, True
@@ -212,7 +212,7 @@ def perturb(motion, j, step):
     numbers = motion.solver_numbers
     for i in range(count):
         if motion.gaps[i] != 0.0:
-            motion.gaps[i] += step * lift(motion, j, i)
+            motion.gaps[i] += step * gap_derivative(motion, j, i)
         if motion.rates[i] != 0.0:
             motion.rates[i] += step * lift_rate(motion, j, i)
         motion.pulls[i] += step * motion.pull_slopes[j, i]
@@ -242,7 +242,7 @@ def accumulation_shifts(motion, near, t):
                 if rates[i] != 0.0:
                     largest = max(largest, abs(lift_rate(motion, j, i) / rates[i]))
                 if gaps[i] != 0.0:
-                    largest = max(largest, abs(lift(motion, j, i) / gaps[i]))
+                    largest = max(largest, abs(gap_derivative(motion, j, i) / gaps[i]))
         for k in range(own * own + count * count):
             largest = max(largest, abs(slope(motion, j, k)))
         change, step = 0.0, RELATIVE_STEP / max(largest, 1e-300)
@@ -289,7 +289,7 @@ def fall_back(motion, t, closed, j):
     u, z = motion.coordinates[own * (1 + j) : own * (2 + j)], motion.velocities[own * (1 + j) : own * (2 + j)]
     given, rates = u.copy(), z.copy()
     for i in range(count):
-        right[i] = lift(motion, j, i)
+        right[i] = gap_derivative(motion, j, i)
     project(motion, closed, u)
     after, lost = u.copy(), np.zeros(own)
     fallen = given - after  # K h
@@ -330,7 +330,7 @@ def start_columns(motion, t, closed):
         lifted, lossless = 0.0, False
         for i in range(count):
             if closed >> i & 1:
-                opened = abs(lift(motion, j, i))
+                opened = abs(gap_derivative(motion, j, i))
                 size = max(opened, abs(lift_rate(motion, j, i)))
                 lifted = max(lifted, size)
                 lossless = lossless or (size > 0.0 and restitution(motion, i, i) >= 1.0)

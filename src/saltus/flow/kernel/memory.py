@@ -177,6 +177,25 @@ class SegmentResults(NamedTuple):
     extremes: Any  # in those of `SegmentColumn`
 
 
+class ImpactRequest(NamedTuple):
+    """The impacts that end segments of an orbit of a model with one contact."""
+
+    spans: Any  # of the segments, as those of `SegmentRequest`
+    signs: Any  # of the gap's rate on the segments
+    speeds: Any  # of the impacts that end them
+    frequency: Any
+    place: Any  # of the frequency among the parameters, or -1
+
+
+class ImpactEquations(NamedTuple):
+    """The equations of these impacts and their derivatives, which are filled."""
+
+    residual: Any  # (n, 2)
+    here: Any  # (n, 2, 2), to phase and speed of the impact before each segment
+    there: Any  # to those of the impact after it
+    parameters: Any  # (n, 2, parameters)
+
+
 class SolverArrays(NamedTuple):
     """The arrays in which impacts and closed contacts are solved for."""
 
@@ -228,6 +247,8 @@ class ContactsSegmentParts(NamedTuple):
     contacts: Any
     step_arrays: StepArrays
     solver: SolverArrays
+    turns: Any  # the times of the extrema in a step, as shares of it
+    least: Any  # an inner minimum and its time
 
 
 class ContactsSegmentRequest(NamedTuple):
@@ -282,12 +303,13 @@ EVENT_BUFFERS = types.NamedTuple((_i2, _f2), EventBuffers)
 BUFFERS = types.Tuple((STEP_BUFFERS, EVENT_BUFFERS))
 ADVANCE = _i(NUMBERS, _f1, ENV, MODEL, _i2, BUFFERS)
 ADVANCE_CONTACTS = _i(NUMBERS, _f1, ENV, CONTACT_MODEL, _i2, BUFFERS)
-SEGMENTS = _i(
-    NUMBERS, ENV, MODEL, types.NamedTuple((_f2, _i2, _f2), SegmentRequest), types.NamedTuple((_f2, _f3, _f2), SegmentResults)
-)
+_results = types.NamedTuple((_f2, _f3, _f2), SegmentResults)
+SEGMENTS = _i(NUMBERS, ENV, MODEL, types.NamedTuple((_f2, _i2, _f2), SegmentRequest), _results)
 CONTACT_SEGMENTS = _i(
     *(NUMBERS, ENV, CONTACT_MODEL, _i2),
     types.NamedTuple((_i2, _f1, _f1), ContactsSegmentRequest),
     types.NamedTuple((_f2, _f3, _f3, _f2), ContactsSegmentResults),
 )
-IMPACT_EQUATIONS = types.void(_f2, _f1, _f1, _f, _i, _f2, _f3, _f2, _f3, _f3, _f3)
+IMPACT_EQUATIONS = types.void(
+    types.NamedTuple((_f2, _f1, _f1, _f, _i), ImpactRequest), _results, types.NamedTuple((_f2, _f3, _f3, _f3), ImpactEquations)
+)

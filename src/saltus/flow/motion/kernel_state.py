@@ -201,7 +201,7 @@ class Recorder:
         self._next = 0  # index of the first sample time that is still to come
         self._check = ValidityCheck(request.system)
 
-    def take(self, numbers: Any) -> None:
+    def empty_buffers(self, numbers: Any) -> None:
         """Empty the buffers."""
         labels, spans, series = (a[: numbers["recorded_steps"]].copy() for a in self.steps)
         if labels.size:

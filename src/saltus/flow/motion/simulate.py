@@ -244,7 +244,7 @@ def _advance(system: System, run: Program, now: KernelState, recorder: Recorder,
     progress(0.0, WHAT)
     while True:
         status = now.advance(run, recorder.steps, recorder.events)
-        recorder.take(now.numbers)
+        recorder.empty_buffers(now.numbers)
         time = now.time
         if end > begin:
             progress((time - begin) / (end - begin), WHAT)

@@ -120,7 +120,7 @@ def first_release(motion, b, order, h, poly):
 
 
 @lean_jit
-def held(motion, target):
+def wait_at_contact(motion, target):
     """One step of REST or CHATTER, up to the first instant at which a contact acceleration points outward."""
     b, order, t = motion.pull_series, motion.order, motion.time
     h = target - t
@@ -170,7 +170,7 @@ def one_pass(motion, target, t_end):
     if motion.sides > 0 and motion.mode == Mode.CONTACT:
         return decide(motion, t_end)
     if motion.sides > 0:
-        held(motion, target)
+        wait_at_contact(motion, target)
     return Status.PAUSED
 
 

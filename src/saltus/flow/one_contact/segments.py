@@ -275,13 +275,14 @@ def follow_segments(numbers, env, functions, request, results):
 
 
 @cached_jit(IMPACT_EQUATIONS)
-def impact_equations(spans, signs, speeds, frequency, place, ends, columns, residual, here, there, parameters):
+def impact_equations(request, followed, equations):
     """The equations of impacts, w / duration = 0 and -w' - v_next = 0 for each segment, and their derivatives.
 
-    `here` holds the derivatives to phase and speed of the impact before the segment, `there` to those of the impact after it.
-    `place` is the place of the frequency among the parameters, or -1. `signs` are the signs of the gap's rate on the segments,
-    and `speeds` the speeds of the impacts that end them.
+    They are those of an `ImpactRequest`, whose segments have been `followed`, and are put into an `ImpactEquations`.
     """
+    spans, signs, speeds, frequency, place = request
+    ends, columns, _ = followed
+    residual, here, there, parameters = equations
     for i in range(spans.shape[0]):
         begin, end, sign = spans[i, SEGMENT_START], spans[i, SEGMENT_END], signs[i]
         quotient, velocity, acceleration = (

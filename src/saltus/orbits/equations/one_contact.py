@@ -268,5 +268,6 @@ class OneContactEquations(OrbitEquations):
         residual, here, there = np.empty((n, 2)), np.empty((n, 2, 2)), np.empty((n, 2, 2))
         parameters = np.empty((n, 2, count))
         place = self.paths.index(FREQUENCY) if FREQUENCY in self.paths else -1
-        load_segments()[1](spans, sign, following, frequency, place, ends, columns, residual, here, there, parameters)
+        request = (spans, sign, following, float(frequency), place)
+        load_segments()[1](request, (ends, columns, extremes), (residual, here, there, parameters))
         return OrbitEvaluation(residual.ravel(), here, there, parameters.reshape(2 * n, count), ends, extremes)
