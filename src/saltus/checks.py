@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import itertools
 import math
 import os
 import sys
+import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -260,9 +262,11 @@ def as_numbers(given: Any, name: str | None = None) -> np.ndarray:
     ParameterError
         There are more of them than can be meant.
     """
+    if not hasattr(given, "__array__") and np.iterable(given):
+        given = list(itertools.islice(given, LIMITS.count + 1))  # an iterator may have no end
     check_size(given, name)
     try:
-        return np.asarray(given if hasattr(given, "__array__") or not np.iterable(given) else list(given), dtype=float)
+        return np.asarray(given, dtype=float)
     except (TypeError, ValueError):
         return np.empty(0)
 
@@ -333,6 +337,13 @@ def check_states(name: str, states: Any, dimension: int = 2) -> np.ndarray:
         each = "coordinate, velocity" if dimension == 2 else "coordinates, velocities"
         raise ParameterError(f"{name} must be states ({each}), an array (n, {dimension}), got {shown(states)}", name)
     return array
+
+
+def notice_degrees(name: str, value: float) -> None:
+    """Warn of a whole number as an angle of more than a turn, which is allowed, and is hardly ever meant in radians."""
+    if abs(value) > 2.0 * math.pi and float(value).is_integer():
+        text = f"{name} = {value:g} is read in radians; {value:g} degrees are np.radians({value:g}) = {math.radians(value):.6g}"
+        warnings.warn(text, UserWarning, stacklevel=2)
 
 
 def settle_numbers(owner: Any, *names: str, **bounds: Any) -> None:

@@ -119,16 +119,22 @@ class SweepError(SaltusError, RuntimeError):
 def near(name: str, known: Iterable[str], also: Iterable[str] = ()) -> str:
     """The end of a sentence about an unknown `name`: the similar names, or all known ones if none is similar.
 
-    Names in `also` are proposed if they are similar, and are not listed otherwise.
+    Names in `also`, the arguments of the function that is asked, are proposed in the same way, and listed behind.
     """
     import difflib
 
+    also = tuple(also)
     known = sorted(str(name) for name in known)  # users write the text of an enumeration's member, not its repr
     close = difflib.get_close_matches(name[:LONGEST_NAME], [*known, *also], n=3, cutoff=0.6)
     if close:
         return "did you mean " + " or ".join(repr(c) for c in close) + "?"
-    listed = ", ".join(known) if known else "none"
-    return "known here: " + (listed if len(listed) <= LONGEST_LIST else listed[:LONGEST_LIST].rpartition(", ")[0] + ", ...")
+    arguments = f"; the arguments are {_listed(also)}" if also else ""
+    return f"known here: {_listed(known)}{arguments}"
+
+
+def _listed(names: Iterable[str]) -> str:
+    listed = ", ".join(sorted(names)) or "none"
+    return listed if len(listed) <= LONGEST_LIST else listed[:LONGEST_LIST].rpartition(", ")[0] + ", ..."
 
 
 def shown(value: Any, most: int = 60) -> str:

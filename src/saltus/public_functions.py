@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, ParamSpec, Protocol, TypeAlias, TypeVar, cast
 
 from saltus.checks import LIMITS
-from saltus.errors import ParameterError, near
+from saltus.errors import ParameterError, near, shown
 
 P = ParamSpec("P")
 R = TypeVar("R", covariant=True)
@@ -93,7 +93,9 @@ def bound_arguments(function: Callable[..., Any], given: tuple[Any, ...], named:
     except TypeError as error:
         sentence, known = str(error), signature.parameters
         if sentence == "too many positional arguments":
-            sentence += "; give the arguments after the first by their names"
+            names = getattr(getattr(given[0], "model", None), "coordinates", ())
+            example = ", ".join(f"{name}={shown(value, 20)}" for name, value in zip(names, given[1:], strict=False))
+            sentence += f"; give the arguments after the first by their names{f': {example}' if example else ''}"
         wrong = next((name for name in named if name not in known), None)
         if wrong is not None and not any(p.kind is p.VAR_KEYWORD for p in known.values()):
             sentence = f"has no argument {wrong!r:.40}; {near(wrong, [name for name in known if name != 'self'])}"

@@ -114,7 +114,11 @@ def broadcast_arrays(arrays: dict[str, Any]) -> tuple[tuple[str, ...], tuple[int
         shape = np.broadcast_shapes(*(a.shape for a in plain.values()))
     except ValueError:
         shapes = ", ".join(f"{name} {plain[name].shape}" for name in many)
-        raise ParameterError(f"the arrays do not broadcast together: {shapes}", "parameters") from None
+        raise ParameterError(
+            f"the arrays do not broadcast together: {shapes}; for each with each, name their dimensions: "
+            f"{many[0]}=xr.DataArray(values, dims={many[0]!r})",
+            "parameters",
+        ) from None
     _check_together(next(iter(many), "parameters"), shape)
     dims = ("trajectory",) if len(shape) == 1 else tuple(f"axis_{i}" for i in range(len(shape)))
     return dims, shape, {}, {name: np.broadcast_to(a, shape).reshape(-1) if a.ndim else a for name, a in plain.items()}

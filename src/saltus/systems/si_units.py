@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from operator import mul, truediv
@@ -39,6 +40,7 @@ class Physical:
         si
             A load in SI units.
         """
+        _notice_milliseconds(si)
         return self._convert(si, truediv, mul, -1)
 
     def load_in_si(self, load: Load) -> Load:
@@ -73,6 +75,16 @@ class Physical:
             for name, signal in load.channels.items()
         }
         return Load(frequency=None if load.frequency is None else by_rate(load.frequency, units["time"]), **channels)
+
+
+def _notice_milliseconds(load: Load) -> None:
+    """Warn of long records whose samples are a second or more apart: instruments sample a hundred times a second, so that the
+    times may be in milliseconds."""
+    for signal in load.channels.values():
+        for term in getattr(signal, "terms", (signal,)):
+            if isinstance(term, Record) and term.time.size > 100 and term.time[-1] - term.time[0] >= term.time.size:
+                text = f"the samples of {term!r} are seconds apart, as times are in seconds; divide those in milliseconds by 1000"
+                warnings.warn(text, UserWarning, stacklevel=2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.checks import LIMITS, RADIANS, check_count, check_number, check_size, settle_numbers
+from saltus.checks import LIMITS, RADIANS, check_count, check_number, check_size, notice_degrees, settle_numbers
 from saltus.errors import ParameterError, shown
 
 
@@ -88,6 +88,7 @@ class Harmonic(Signal):
 
     def __post_init__(self) -> None:
         settle_numbers(self, "amplitude", "mean", "phase")
+        notice_degrees("phase", self.phase)
         order: Any = self.order
         if isinstance(order, float) and order.is_integer():  # from a column of numbers
             object.__setattr__(self, "order", int(order))

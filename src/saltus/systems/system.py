@@ -87,7 +87,12 @@ class System:
         ParameterError
             A path that leads nowhere (the error names similar ones), or a value that is refused there.
         """
-        system: System = replace(self, {**(changes or {}), **more})
+        given = {**(changes or {}), **more}
+        for path in given:
+            if str(path).partition(".")[0] not in children(self):
+                hint = near(str(path), [*children(self), *self.parameters])
+                raise ParameterError(f"no parameter {shown(path)}; {hint} (as in with_({{'load.frequency': 1.1}}))", str(path))
+        system: System = replace(self, given)
         return system
 
     def get(self, path: str) -> Any:
@@ -240,7 +245,9 @@ def _check_parts(system: System) -> None:
         raise ParameterError(f"load must be a Load, such as Load(frequency=1.0, ...), got {shown(system.load)}", "load")
     if not isinstance(system.impact, ImpactLaw):
         raise ParameterError(
-            f"impact must be an ImpactLaw, such as VelocityReduction(e=0.9), got {shown(system.impact)}", "impact"
+            "impact must be an ImpactLaw: VelocityReduction(e) where a motion passes the contact, NewtonImpact(e) where it "
+            f"bounces, EnergyRestitution(...) or InelasticImpact(); got {shown(system.impact)}",
+            "impact",
         )
 
 

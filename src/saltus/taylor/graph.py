@@ -22,6 +22,10 @@ ALLOWED = (
     f"+ - * /, powers, NumPy's {', '.join(function.numpy.__name__ for function in FUNCTIONS.values())}, tan, and abs of the "
     "coordinate (the sign of the coordinate is `side`)"
 )
+BRANCH = (
+    "only an impact law may compare: where the equations change at a contact, the model is a OneContactModel, whose `side` "
+    "stands for the branch, as in -(1 + side) * x"
+)
 FRICTION = (
     "a force that jumps with the sign of a velocity (dry friction, stick-slip) cannot be traced: give the model a Friction; a "
     "smooth one, such as -tanh(velocity / w), can be"

@@ -23,6 +23,7 @@ from saltus.systems import (
 )
 from saltus.systems import substitute as substitute_numbers
 from saltus.taylor.graph import (
+    BRANCH,
     FRICTION,
     POINTWISE,
     Expr,
@@ -358,7 +359,7 @@ def _check(result: Trace) -> None:
     for node in ordered(expanded):
         if node.op in POINTWISE:
             where = f"{result.model} uses {node.op} in an acceleration, a gap or a margin"
-            raise TraceError(f"{where}; {FRICTION if uses_velocity(*node.args) else 'only an impact law may compare'}")
+            raise TraceError(f"{where}; {FRICTION if uses_velocity(*node.args) else BRANCH}")
     if result.gap is not None:
         for node in ordered([result.gap]):
             if node.op in ("time", "record", "velocity"):

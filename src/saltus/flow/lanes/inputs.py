@@ -13,8 +13,12 @@ from saltus.checks import LIMITS, check_memory
 from saltus.errors import ParameterError
 from saltus.flow.lanes.ensemble_dataset import result_names
 from saltus.flow.motion.motion import rate_name
-from saltus.flow.motion.simulate import ARGUMENTS
 from saltus.systems import System, broadcast_arrays, check_parameters, finite_array, numbers, parameter_table, read_starts
+
+ARGUMENTS = (  # of `simulate_many`: a misspelt one arrives among the coordinates
+    *("velocity", "parameters", "periods", "duration", "tol", "time", "side", "stop_at", "sample", "last", "until"),
+    *("sensitivities", "threads", "progress"),
+)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.checks import check_count, instants
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, near
 from saltus.flow.motion.events import EventKind, Impacts, MotionEvents, Stop, modes_of
 from saltus.flow.motion.validity import DenseOutput, Validity, ValidityCheck
 from saltus.notebook import html_table
@@ -104,7 +104,8 @@ class Motion(Result):
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_") or name == "system" or name not in self.system.model.coordinates:
-            raise AttributeError(f"a Motion has no {name!r}")
+            known = () if name.startswith("_") or name == "system" else self.system.model.coordinates
+            raise AttributeError(f"a Motion has no {name!r}" + (f"; {near(name, known)}" if known else ""))
         position = np.atleast_1d(self.position)
         return float(position[self.system.model.coordinates.index(name)])
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import LIMITS, check_memory, check_number, check_size
+from saltus.checks import LIMITS, check_memory, check_number, check_size, notice_degrees
 from saltus.errors import MotionError, ParameterError
 from saltus.flow.kernel.compiled import Program, limits_of, program
 from saltus.flow.kernel.layout import Mode, Status
@@ -21,7 +21,8 @@ from saltus.progress import Progress, silent
 from saltus.public_functions import Numbers
 from saltus.systems import System, check_system, read_start
 
-ARGUMENTS = ("velocity", "periods", "duration", "time")  # a misspelt one arrives among the coordinates
+# The arguments of `simulate` and `sensitivities`: a misspelt one arrives among the coordinates.
+ARGUMENTS = ("velocity", "periods", "duration", "tol", "time", "side", "stop_at", "dense", "progress")
 
 MOST_PERIODS = 2**53  # as many as can be counted exactly
 
@@ -105,7 +106,11 @@ class MotionRequest:
 
     def _read(self) -> dict[str, Any]:
         """The fields that follow from the arguments."""
-        position, speeds = np.split(read_start(self.system, self.velocity, self.coordinates, ARGUMENTS), 2)
+        arguments = (*ARGUMENTS, "times" if self.sensitivities is None else "parameters")
+        position, speeds = np.split(read_start(self.system, self.velocity, self.coordinates, arguments), 2)
+        for name, value in zip(self.system.model.coordinates, position, strict=True):
+            if self.system.model.unit_of(name) == "rad":
+                notice_degrees(name, value)
         limits = limits_of(self.system, self.stop_at)
         check_number("tol", self.tol, at_least=1e-15, at_most=1e-6)
         check_number("time", self.time)
@@ -328,7 +333,7 @@ def _collect(request: MotionRequest, now: KernelState, status: int, recorder: Re
     if status == Status.LIMITED:
         stop, limit = Stop.LIMIT, request.limits[events.details[-1]]
     if status == Status.STALLED:
-        stop, limit = Stop.SINGULAR, request.system.model.singularity
+        stop, limit = Stop.SINGULAR, request.system.model.singularity  # `_refuse` lets no other motion stall
     samples = recorder.samples(time, position, velocity, now.side)
     return Motion(
         system=request.system,
