@@ -44,7 +44,7 @@ def test_near_names_are_those_that_a_user_writes():
     colour = StrEnum("colour", ["RED", "GREEN"])
     assert near("rd", colour) == "did you mean 'red'?"
     assert near("grean", colour, ("greens",)) == "did you mean 'green' or 'greens'?"
-    assert near("x", colour, ("blue",)) == "known here: green, red"
+    assert near("x", colour, ("blue",)) == "known here: green, red; the arguments are blue"
 
 
 # --- every public function ---------------------------------------------------------------------------------------------------

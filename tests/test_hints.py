@@ -33,9 +33,9 @@ HINTS: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: saltus.simulate(SYSTEM, theta=0.3, periods=1, n_jobs=2),
         "no coordinate 'n_jobs'; known here: theta; the arguments are .*periods.*times.*tol",
     ),
-    "an argument of simulate_many": (
-        lambda: saltus.simulate_many(SYSTEM, theta=0.3, periods=1, cores=2),
-        "sensitivities.*threads",
+    "an argument of nobody": (
+        lambda: saltus.simulate_many(SYSTEM, theta=0.3, periods=1, n_jobs=2),
+        "n_jobs.*known here: theta; the arguments are .*sensitivities.*threads",
     ),
     "a misspelt argument": (lambda: saltus.simulate(SYSTEM, theta=0.3, periods=1, stopat=()), "did you mean 'stop_at'"),
     "a state without its name": (lambda: saltus.simulate(SYSTEM, 0.3, periods=1), "by their names: theta=0.3$"),

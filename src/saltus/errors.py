@@ -125,7 +125,9 @@ def near(name: str, known: Iterable[str], also: Iterable[str] = ()) -> str:
 
     also = tuple(also)
     known = sorted(str(name) for name in known)  # users write the text of an enumeration's member, not its repr
-    close = difflib.get_close_matches(name[:LONGEST_NAME], [*known, *also], n=3, cutoff=0.6)
+    asked = name[:LONGEST_NAME]
+    further = difflib.get_close_matches(asked, also, n=3, cutoff=0.7)  # theta is near threads, but is not meant
+    close = difflib.get_close_matches(asked, [*known, *further], n=3, cutoff=0.6)
     if close:
         return "did you mean " + " or ".join(repr(c) for c in close) + "?"
     arguments = f"; the arguments are {_listed(also)}" if also else ""

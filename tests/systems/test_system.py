@@ -178,7 +178,7 @@ def test_paths_of_an_example_are_listed():
     [
         ("model.beta", "'beta0'"),
         ("model.dampng", "'damping'"),
-        ("lod.frequency", "'load'"),
+        ("lod.frequency", "'load.frequency'"),
         ("load.horizontal.0.amplitud", "'amplitude'"),
         ("impact.r", "known here: e"),
         ("model.beta0.x", "has no 'x'"),
