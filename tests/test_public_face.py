@@ -57,7 +57,10 @@ def made():
     chart = studies.stability_chart(SYSTEM, horizontal=[0.1, 0.2], vertical=[-0.5, -0.4], starts=2, periods=60)
     many = saltus.simulate_many(SYSTEM, theta=[0.1, 0.3], periods=4, last=3)
     branch.to_xarray()  # computes defects, which are then kept
-    return {"motion": motion, "orbit": orbit, "branch": branch, "fold": fold, "curve": curve, "chart": chart, "many": many}
+    record = saltus.Measurement(start={"theta": 0.3}, time=[0.5, 1.0], values={"theta": [0.3, 0.2]}, sigma=0.1)
+    found = saltus.fit(SYSTEM, record, {"model.damping": (0.0, 1.0)}, starts=1)
+    more = {"record": record, "fit": found, "sensitivities": saltus.sensitivities(SYSTEM, theta=0.3, periods=1)}
+    return more | {"motion": motion, "orbit": orbit, "branch": branch, "fold": fold, "curve": curve, "chart": chart, "many": many}
 
 
 def good(made):
@@ -106,7 +109,7 @@ def good(made):
         "saltus.load_study": {"path": "/nowhere/study.toml"},
         "saltus.lyapunov_many": one,
         "saltus.lyapunov_spectrum": one,
-        "saltus.map_over": {"function": np.hypot, "grid": {"x": [1.0]}},
+        "saltus.map_over": {"function": double, "grid": {"x": [1.0]}},
         "saltus.mean_dissipated_power": {"of": made["motion"]},
         "saltus.transmissibility": {"of": made["motion"], "channel": "horizontal"},
         "saltus.plot": {"result": made["motion"]},
@@ -208,6 +211,9 @@ def good(made):
         "Load": (saltus.Load, {"frequency": 1.0, "horizontal": 0.1}),
         "ImpactPair": (saltus.ImpactPair, {}),
         "MavroeidisPapageorgiou": (saltus.MavroeidisPapageorgiou, {"amplitude": 0.1, "frequency": 1.0, "gamma": 2.0}),
+        "Fit.log_likelihood": (made["fit"].log_likelihood, {"values": [0.1]}),
+        "Measurement": (saltus.Measurement, {"start": {"theta": 0.3}, "time": [0.5, 1.0], "values": {"theta": [0.3, 0.2]}}),
+        "Measurement.sigma_of": (made["record"].sigma_of, {"quantity": "theta"}),
         "Metainterface": (model, {"beta0": 1.4}),
         "Motion.at": (made["motion"].at, {"times": 1.0}),
         "Motion.samples": (made["motion"].samples, {"count": 10}),
@@ -229,6 +235,7 @@ def good(made):
         "Ricker": (saltus.Ricker, {"amplitude": 0.1, "frequency": 1.0}),
         "Record": (saltus.Record, {"time": [0.0, 1.0], "value": [0.0, 1.0]}),
         "RockingBlock": (saltus.RockingBlock, {"alpha": 0.3}),
+        "Sensitivities.at": (made["sensitivities"].at, {"times": 1.0}),
         "SpecialCurve.at": (curve.at, {"path": "load.vertical", "value": -0.5}),
         "System": (saltus.System, {"model": SYSTEM.model, "load": SYSTEM.load, "impact": SYSTEM.impact}),
         "System.from_dict": (saltus.System.from_dict, {"data": SYSTEM.to_dict()}),
@@ -258,6 +265,11 @@ def good(made):
 def squares(arguments, block):
     """What the sweep computes."""
     return {"y": block["x"] ** 2}
+
+
+def double(x):
+    """What is asked over a grid."""
+    return 2 * x
 
 
 def _room(name):

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.checks import check_count
 from saltus.errors import ParameterError, shown
 from saltus.progress import Progress, silent
 from saltus.provenance import provenance
@@ -112,6 +113,7 @@ def map_over(
         raise ParameterError(f"function must be a function of the names of the grid, got {shown(function)}", "function")
     if not isinstance(grid, Mapping) or not grid:
         raise ParameterError(f"grid must be a dict of lists of numbers, by their names, got {shown(grid)}", "grid")
+    check_count("retries", retries, 0, 100)
     path = check_run(store, workers, scheduler, progress)
     axes = {name: axis_values(name, values) for name, values in grid.items()}
     name = getattr(function, "__qualname__", type(function).__name__)
