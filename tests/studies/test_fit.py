@@ -90,6 +90,7 @@ def test_impact_times_alone_give_the_restitution_of_a_ball_by_their_closed_form(
     data = saltus.Measurement(start={"x": -h}, impacts=times, impact_sigma=sigma)
     found = saltus.fit(ball, data, {"impact.e": (0.1, 1.0)})
     assert found.values["impact.e"] == pytest.approx(e, abs=1e-10)
+    assert saltus.fit(ball, data, ["impact.e"]).values["impact.e"] == pytest.approx(e, abs=1e-10)  # without bounds
     slopes = first * np.array([0.0, 2.0, 2 + 4 * e])
     assert found.errors["impact.e"] == pytest.approx(sigma / np.linalg.norm(slopes), rel=1e-8)
     both = saltus.fit(ball.with_({"impact.e": e}), data, {"load.force": (0.5, 2.0), "start.x": (-4.0, -1.0)})

@@ -325,7 +325,7 @@ def _search(system: System, data: Any, parameters: Any, functions: Any, tol: flo
     for path, pair in given.items():
         for name, value in _unknowns_of(system, records, path):
             low, high = (-math.inf, math.inf) if pair is None else (float(x) for x in pair)
-            if not low < high or math.isnan(low + high):
+            if not low < high:  # nan too
                 raise ParameterError(f"the bounds of {path} must be (lowest, highest), got {shown(pair)}", "parameters")
             names.append(name)
             first.append(min(max(value, low), high))
