@@ -85,10 +85,13 @@ def test_what_an_effort_does_not_follow_in_windows_of_chaos_is_listed_with_its_r
     assert some["branches"].sizes["branch"] < every["branches"].sizes["branch"] <= some["branches"].sizes["branch"] + quick.narrow
 
 
-def test_killed_at_several_moments_a_search_goes_on_to_the_same_bytes(kept, tmp_path):
+@pytest.mark.parametrize("moments", [(1 / 3,), pytest.param((0.05, 0.2, 1 / 3, 2 / 3), marks=pytest.mark.thorough)])
+def test_killed_at_several_moments_a_search_goes_on_to_the_same_bytes(kept, tmp_path, moments):
+    """After such shares of its parts: each run before or after it has written a part."""
     chunks = sum(status(kept / "diagram.zarr").remembered.values())
-    for count in (6, chunks // 3 | 1):
-        kill("one", tmp_path / "diagram.zarr", count)
+    for share in moments:
+        left = chunks - (sum(status(store).remembered.values()) if (store := tmp_path / "diagram.zarr").exists() else 0)
+        kill("one", store, 1 + int(share * left))
     assert files(computed(tmp_path)) == files(kept)
 
 
