@@ -36,6 +36,7 @@ autosummary_generate = False  # the pages of the reference are written by saltus
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True  # as they are written: the text of a function is no expression
 python_use_unqualified_type_names = True
 maximum_signature_line_length = 100
 toc_object_entries_show_parents = "hide"  # the contents at the right are narrow
