@@ -58,6 +58,8 @@ from .orbits import transmissibility as transmissibility
 from .plots import animate as animate
 from .plots import plot as plot
 from .progress import show_progress as show_progress
+from .result import to_csv as to_csv
+from .result import to_pandas as to_pandas
 from .studies import Fit as Fit
 from .studies import Measurement as Measurement
 from .studies import bifurcation_diagram as bifurcation_diagram

@@ -10,8 +10,10 @@ import sys
 from collections.abc import Callable
 
 from saltus.checks import check_number
+from saltus.notebook import LineBelowCell
 
 Progress = Callable[[float, str], object]
+LINE = LineBelowCell()
 
 
 def silent(fraction: float, what: str) -> None:
@@ -19,7 +21,7 @@ def silent(fraction: float, what: str) -> None:
 
 
 def show_progress(fraction: float, what: str) -> None:
-    """The progress of work in one line on stderr, written over itself: for terminals and notebooks, `progress=show_progress`.
+    """The progress of work in one line on stderr, or of a notebook below the cell, written over itself: `progress=show_progress`.
 
     Parameters
     ----------
@@ -33,6 +35,8 @@ def show_progress(fraction: float, what: str) -> None:
     >>> ends = saltus.simulate_many(system, theta=[0.1, 0.3], periods=10, progress=saltus.show_progress)
     """
     check_number("fraction", fraction)
+    if LINE.show(min(max(fraction, 0.0), 1.0), what):
+        return
     bar = "#" * round(20 * min(max(fraction, 0.0), 1.0))
     done = fraction >= 1.0
     print(f"\r[{bar:<20}] {100 * fraction:3.0f} % {what:<40.40}", end="\n" if done else "", file=sys.stderr, flush=True)

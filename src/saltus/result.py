@@ -5,11 +5,13 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from enum import Enum
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.notebook import html_table
+from saltus.errors import ParameterError, near, shown
+from saltus.notebook import html_table, rows_table
 from saltus.provenance import provenance
 
 if TYPE_CHECKING:
@@ -29,8 +31,18 @@ class Result:
         raise NotImplementedError
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A table of the dataset, see `table_of`."""
+        """A table of the result; `saltus.to_pandas` gives its other tables."""
         return table_of(self.to_xarray())
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write the table as comma-separated text, every number with all of its digits; returns the path.
+
+        Parameters
+        ----------
+        path
+            The path of the file.
+        """
+        return to_csv(path, self)
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({', '.join(f'{name}={value}' for name, value in self._facts().items())})"
@@ -60,29 +72,166 @@ def result_dataset(
     return xarray.Dataset(variables, coords, known | {"Conventions": "CF-1.8"})
 
 
-def table_of(data: Any) -> pandas.DataFrame:
-    """A table of a Dataset, or of the first part of a DataTree that is not empty.
+# Results whose motions or cells lie on a grid: a row of the table is one of them.
+ON_GRIDS = ("ensemble", "basins", "overturning_spectrum", "stability_chart", "phase_portrait", "fragility")
+FIRST_PARTS = ("points", "chart", "cells")  # of a tree, which its table shows unless another one is asked for
 
-    Its rows are the entries of the first dimension of the first variable that has any; a variable with a further dimension has a
-    column for each of its entries, named `variable_entry`. A dataset of single values has one row.
+
+def table_of(data: Any, table: str | None = None) -> pandas.DataFrame:
+    """A table of a Dataset or a DataTree: long, a row for each thing of one kind, and never a product of unrelated dimensions.
+
+    A Dataset has a table for each of its dimensions; the first is that of its first variable, or of the whole grid of an
+    ensemble, with a column for each of its axes. A variable with one more dimension has a column for each of its entries, named
+    `variable_entry`. A DataTree has the tables of its parts, `points` first if it has them. Single values have one row.
     """
+    if getattr(data, "children", None):
+        parts = {node.path.strip("/"): node.to_dataset(inherit=False) for node in data.subtree if node.data_vars}
+        full = [name for name, part in parts.items() if any(variable.size for variable in part.data_vars.values())]
+        first = next((name for name in (*FIRST_PARTS, *full) if name in full), next(iter(parts), ""))
+        name, _, dim = (first if table is None else table).partition(".")
+        if name not in parts:
+            raise ParameterError(f"there is no table {shown(table)}; {near(str(table), parts)}", "table")
+        return table_of(parts[name], dim or None)
+    over = _rows_of(data, table)
+    return _long_table(data, over) if len(over) > 1 else _wide_table(data, over[0] if over else None)
+
+
+def _rows_of(data: Any, table: str | None) -> tuple[str, ...]:
+    """The dimensions whose entries are the rows of a table."""
+    dims = [tuple(map(str, variable.dims)) for variable in data.data_vars.values() if variable.dims]
+    known = dict.fromkeys(each[0] for each in dims)
+    if table is not None:
+        if table not in known:
+            raise ParameterError(f"there is no table {shown(table)}; {near(str(table), known)}", "table")
+        return (table,)
+    if data.attrs.get("kind") in ON_GRIDS and dims:
+        return dims[0]
+    return dims[0][:1] if dims else ()
+
+
+def _long_table(data: Any, over: tuple[str, ...]) -> pandas.DataFrame:
+    """A row for each cell of a grid; variables with further dimensions, such as samples over time, are left out."""
     import pandas
 
-    if getattr(data, "children", None):
-        data = next(node.to_dataset() for node in data.subtree if any(data_array.size for data_array in node.data_vars.values()))
-    over = next((variable.dims[0] for variable in data.data_vars.values() if variable.dims), None)
+    shape = tuple(data.sizes[dim] for dim in over)
+    places = np.indices(shape).reshape(len(over), -1)
+    columns: dict[str, Any] = {dim: data[dim].values[at] for dim, at in zip(over, places, strict=True)}
+    for name, variable in data.variables.items():
+        if name not in columns and set(variable.dims) <= set(over):
+            at = tuple(places[over.index(str(dim))] for dim in variable.dims)
+            columns[str(name)] = _in_words(variable)[at] if variable.dims else np.full(places.shape[1], variable.values)
+    return pandas.DataFrame(columns)
+
+
+def _wide_table(data: Any, over: str | None) -> pandas.DataFrame:
+    """A row for each entry of a dimension, or one row of single values."""
+    import pandas
+
     columns: dict[str, Any] = {}
     for name, variable in data.data_vars.items():
         if over is None and not variable.dims:
             columns[str(name)] = [variable.values[()]]
         elif variable.dims == (over,):
-            columns[str(name)] = variable.values
+            columns[str(name)] = _in_words(variable)
         elif over in variable.dims and variable.ndim == 2:
             spread = variable.transpose(over, ...)
             entries = spread[spread.dims[1]].values.tolist()
             columns |= {f"{name}_{entry}": column for entry, column in zip(entries, spread.values.T, strict=True)}
     index = None if over is None else pandas.Index(data[over].values, name=str(over))
     return pandas.DataFrame(columns, index=index)
+
+
+def _in_words(variable: Any) -> np.ndarray:
+    """The values of a variable, numbers that stand for words as these."""
+    words, values = str(variable.attrs.get("flag_meanings", "")).split(), np.asarray(variable.values)
+    numbers = variable.attrs.get("flag_values", range(len(words)))
+    if not words or "flag_masks" in variable.attrs or not values.size or list(numbers) != list(range(len(words))):
+        return values
+    return np.array(words)[values] if values.min() >= 0 and values.max() < len(words) else values
+
+
+def to_pandas(result: Any, table: str | None = None) -> pandas.DataFrame:
+    """A table of any result: long and tidy, with a row for each point, motion, cell or event.
+
+    Parameters
+    ----------
+    result
+        A result, such as a branch, or a Dataset or a DataTree that saltus has made, such as an ensemble or a diagram.
+    table
+        Which of its tables: the name of a dimension, such as "special" of a branch, or of a part of a tree, such as "special" or
+        "bands" of a diagram. By default that of its points, or of all motions of an ensemble.
+
+    Raises
+    ------
+    ParameterError
+        Something that is no result, or a table that it does not have; the error names those that it has.
+
+    Examples
+    --------
+    >>> ends = saltus.simulate_many(system, theta=[0.1, 0.2], periods=2)
+    >>> saltus.to_pandas(ends)[["start_theta", "impact_count"]].values.tolist()
+    [[0.1, 4.0], [0.2, 3.0]]
+    >>> saltus.to_pandas(branch, "special").kind.tolist()[:1]
+    ['LP']
+    """
+    if hasattr(result, "to_pandas") and not hasattr(result, "data_vars"):
+        made: pandas.DataFrame = result.to_pandas() if table is None else table_of(result.to_xarray(), table)
+        return made
+    if not (hasattr(result, "data_vars") and hasattr(result, "attrs")):
+        raise ParameterError(f"result must be a Dataset, a DataTree or what has to_pandas, got {shown(result)}", "result")
+    return table_of(result, table)
+
+
+def to_csv(path: str | Path, result: Any, table: str | None = None) -> Path:
+    """Write a table of any result as comma-separated text, every number with all of its digits; returns the path.
+
+    Parameters
+    ----------
+    path
+        The path of the file, which is complete or not there.
+    result, table
+        As for `to_pandas`.
+
+    Raises
+    ------
+    ParameterError
+        As for `to_pandas`.
+
+    Examples
+    --------
+    >>> saltus.to_csv("branch.csv", branch).read_text().split(",")[:2]
+    ['point', 'parameter']
+    """
+    from saltus.files import write_text
+
+    return write_text(path, to_pandas(result, table).to_csv(lineterminator="\n"))
+
+
+class RowTable:
+    """What has a table by itself: the events of a motion, the special points of a branch."""
+
+    def _table(self) -> dict[str, Any]:
+        """The columns, by their names."""
+        raise NotImplementedError
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The table."""
+        import pandas
+
+        return pandas.DataFrame(self._table())
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write the table as comma-separated text; returns the path.
+
+        Parameters
+        ----------
+        path
+            The path of the file.
+        """
+        return to_csv(path, self)
+
+    def _repr_html_(self) -> str:
+        return rows_table(self._table())
 
 
 def _is_short(value: Any) -> bool:

@@ -115,7 +115,7 @@ def test_progress_is_one_line_that_ends(capsys):
 
 def test_stops_have_names():
     many = saltus.simulate_many(SYSTEM, theta=[0.0, 0.3], periods=2)
-    assert set(saltus.stop_names(many)) <= {str(stop) for stop in saltus.Stop}
+    assert set(saltus.stop_names(many).values) <= {str(stop) for stop in saltus.Stop}
 
 
 def test_what_is_saved_is_loaded_again_and_an_own_dataset_gets_the_version(tmp_path, motion):

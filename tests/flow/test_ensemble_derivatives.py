@@ -49,7 +49,7 @@ def test_the_start_is_fixed_and_the_end_moves_only_with_the_periods_asked_for(C,
         tol=1e-14,
     )
     found = ensemble.derivative.sel(column="load.frequency").values
-    assert set(stop_names(ensemble)) == {stop}
+    assert set(stop_names(ensemble).values) == {stop}
     for i, (theta, velocity) in enumerate(STATES):
         length = {"periods": float(ensemble.periods[i]), "duration": float(ensemble.time[i]) - time}[held]
         expected = by_differences(system, theta, velocity, time, {held: length})

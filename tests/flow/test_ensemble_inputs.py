@@ -233,7 +233,7 @@ def test_every_parameter_may_be_a_column():
 def test_starts_beyond_the_wall_end_at_once_and_disturb_no_others():
     system = System(model=WallOscillator(wall=0.2), load=Load(frequency=1.0, force=Harmonic(0.1)))
     ensemble = saltus.simulate_many(system, x=np.array([0.1, 0.3, 0.2, -1.0]), periods=1)
-    assert stop_names(ensemble).tolist()[1] == "outside"
+    assert stop_names(ensemble).values.tolist()[1] == "outside"
     alone = saltus.simulate_many(system, x=np.array([0.1, 0.2, -1.0]), periods=1)
     np.testing.assert_array_equal(ensemble.x.values[[0, 2, 3]], alone.x)
 
@@ -349,7 +349,7 @@ def test_junk_is_refused_or_taken_but_never_a_traceback_of_another_kind(argument
     except SaltusError:
         pass
     else:
-        finite = np.isfinite(ensemble.theta.values) | ~np.isin(stop_names(ensemble), ["horizon", "rest"])
+        finite = np.isfinite(ensemble.theta.values) | ~np.isin(stop_names(ensemble).values, ["horizon", "rest"])
         assert finite.all()
 
 
@@ -364,7 +364,7 @@ def test_junk_is_refused_or_taken_but_never_a_traceback_of_another_kind(argument
 def test_numbers_of_any_size_end_with_a_reason(theta, velocity, amplitude, damping, frequency):
     columns = {"load.horizontal.amplitude": amplitude, "model.damping": np.array([damping]), "load.frequency": frequency}
     ensemble = run(theta=theta, velocity=velocity, parameters=columns, periods=None, duration=1e-3)
-    name = stop_names(ensemble)[0]
+    name = stop_names(ensemble).values[0]
     assert name in ("horizon", "rest", "not_finite", "stalled", "not_unique")
     if name in ("horizon", "rest"):
         assert np.isfinite([float(ensemble.theta[0]), float(ensemble.velocity[0])]).all()

@@ -101,7 +101,7 @@ def test_the_whole_motion_has_the_extremes_of_its_periods():
     cases = long_cases("rocking", 200)
     everything = cases.in_lanes(sample=KINDS, last="all")
     few = cases.in_lanes(sample=("extrema", "speed"), last=1)
-    started = stop_names(everything) != "outside"
+    started = stop_names(everything).values != "outside"
     for name, best in (("largest_theta", "max"), ("smallest_theta", "min"), ("least_speed", "min")):
         expected = getattr(everything[name], best)("period").values
         np.testing.assert_array_equal(everything[f"overall_{name}"].values[started], expected[started])
@@ -111,7 +111,7 @@ def test_the_whole_motion_has_the_extremes_of_its_periods():
 def test_the_period_in_which_a_motion_is_captured_is_kept():
     cases = attracted(150, 0.8)
     ensemble = cases.in_lanes(until="rest", sample=KINDS, last="all")
-    captured = ensemble.isel(trajectory=np.flatnonzero(stop_names(ensemble) == "captured"))
+    captured = ensemble.isel(trajectory=np.flatnonzero(stop_names(ensemble).values == "captured"))
     assert captured.sizes["trajectory"] >= 8
     np.testing.assert_array_equal(captured.sampled_theta[:, -1], captured.theta)
     np.testing.assert_array_equal(captured.sampled_velocity[:, -1], captured.velocity)
@@ -136,7 +136,7 @@ def test_the_last_periods_are_the_tail_of_all_of_them():
             "period_impact_count",
         ):
             np.testing.assert_array_equal(tail[name], everything[name].values[:, -last:])
-    ended = stop_names(everything) == "horizon"
+    ended = stop_names(everything).values == "horizon"
     np.testing.assert_array_equal(everything.sampled_theta[ended, -1], everything.theta[ended])
     np.testing.assert_array_equal(everything.sampled_velocity[ended, -1], everything.velocity[ended])
 
@@ -145,12 +145,12 @@ def test_periods_that_a_motion_did_not_reach_are_nan_and_come_first():
     block = FAMILIES["rocking"](np.random.default_rng(2), 200)
     cases = Cases(block.system, block.columns, block.state, block.velocity, np.zeros(200), {"periods": 6.0})
     ensemble = cases.in_lanes(sample=KINDS, last="all")
-    early = stop_names(ensemble) == "limit"
+    early = stop_names(ensemble).values == "limit"
     assert early.sum() > 20
     for row in ensemble.isel(trajectory=np.flatnonzero(early)).transpose("trajectory", ...).sampled_theta.values:
         missing = np.isnan(row)
         assert (np.diff(missing.astype(int)) <= 0).all()  # nan first, then numbers
-    started = stop_names(ensemble) != "outside"
+    started = stop_names(ensemble).values != "outside"
     there = np.isfinite(ensemble.sampled_theta.values).sum(axis=1)
     np.testing.assert_array_equal(there[started], np.maximum(np.ceil(ensemble.periods.values - 1e-9), 1)[started])
     np.testing.assert_array_equal(ensemble.sampled_theta[started, -1], ensemble.theta[started])
@@ -188,7 +188,7 @@ def test_a_resting_system_has_extrema_zero_and_no_speed():
     assert not here.smallest_theta.any()
     assert np.isinf(here.least_speed).all()
     assert not here.period_impact_count.any()
-    assert str(stop_names(here)) == "rest"
+    assert str(stop_names(here).values) == "rest"
 
 
 # --- ending early ------------------------------------------------------------------------------------------------------------
@@ -210,7 +210,7 @@ def attracted(n, e=0.8, V=-0.5, damping=0.2):
 def test_cycles_that_are_found_go_on_repeating_themselves(e):
     cases = attracted(60, e)
     ensemble = cases.in_lanes(until="settled", last=2, tol=1e-13)
-    settled = np.flatnonzero(stop_names(ensemble) == "settled")
+    settled = np.flatnonzero(stop_names(ensemble).values == "settled")
     assert settled.size >= 10
     assert (ensemble.recurrence_period.values[settled] > 0).all()
     assert not ensemble.recurrence_period.values[np.setdiff1d(np.arange(60), settled)].any()
@@ -248,7 +248,7 @@ def test_chaos_does_not_settle():
     ends = {"x": ensemble.x.values, "velocity": ensemble.velocity.values}  # chaos may pass
     tangent = saltus.simulate_many(system, **ends, periods=150, parameters=amplitude, sensitivities=(), tol=1e-10)
     exponent = np.log(np.abs(tangent.derivative.values).max(axis=(1, 2))) / tangent.time.values
-    chaotic, settled = exponent > 0.05, stop_names(ensemble) == "settled"
+    chaotic, settled = exponent > 0.05, stop_names(ensemble).values == "settled"
     assert chaotic.sum() >= 3
     assert settled.sum() >= 8
     assert not (chaotic & settled).any()
@@ -257,7 +257,7 @@ def test_chaos_does_not_settle():
 def test_what_is_captured_comes_to_rest_and_never_leaves():
     cases = attracted(150, 0.8)
     ensemble = cases.in_lanes(until="rest", tol=1e-12)
-    captured = np.flatnonzero(stop_names(ensemble) == "captured")
+    captured = np.flatnonzero(stop_names(ensemble).values == "captured")
     assert captured.size >= 8
     for i in captured[:60]:
         system, _ = cases.one(i)
@@ -272,9 +272,9 @@ def test_what_is_captured_comes_to_rest_and_never_leaves():
         assert motion.stop == "rest"
         assert not motion.events.of(saltus.EventKind.RELEASE)
     free = cases.in_lanes(tol=1e-12)
-    assert (stop_names(free)[captured] == "rest").all()
+    assert (stop_names(free).values[captured] == "rest").all()
     others = np.setdiff1d(np.arange(150), captured)
-    assert not (stop_names(ensemble)[others] == "captured").any()
+    assert not (stop_names(ensemble).values[others] == "captured").any()
     np.testing.assert_array_equal(free.theta.values[others], ensemble.theta.values[others])
 
 
@@ -290,8 +290,8 @@ def test_nothing_is_captured_where_the_load_lifts_off():
     ensemble = saltus.simulate_many(
         system, theta=0.01, periods=3, parameters={"load.horizontal.amplitude": amplitude}, until="rest"
     )
-    assert stop_names(ensemble)[0] == "captured"
-    assert not (stop_names(ensemble)[2:] == "captured").any()
+    assert stop_names(ensemble).values[0] == "captured"
+    assert not (stop_names(ensemble).values[2:] == "captured").any()
 
 
 def test_zero_time_keeps_the_state():

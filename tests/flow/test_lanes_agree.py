@@ -27,7 +27,7 @@ TOLERANCES = (1e-14, 1e-15, 1e-14, 1e-12, 1e-9)  # batch by batch, in turn
 
 def counted_in_lanes(ensemble):
     held = ensemble.chatter_speed.values > 0
-    return [*zip(stop_names(ensemble), ensemble.impact_count.values, ensemble.side.values, held, strict=True)]
+    return [*zip(stop_names(ensemble).values, ensemble.impact_count.values, ensemble.side.values, held, strict=True)]
 
 
 def counted(motion):
@@ -98,7 +98,7 @@ def test_lanes_agree_with_themselves_at_another_tolerance(family):
     state, again = end_state(one, cases.system), end_state(other, cases.system)
     error = np.abs(state - again).max(axis=1) / np.maximum(1.0, np.abs(again).max(axis=1))
     allowed = 5e-12 * magnified + one.impact_count.values * 8 * np.spacing(1.0) * elapsed(cases)
-    ended = np.isin(stop_names(one), ["horizon", "rest", "limit"])  # not at a singularity
+    ended = np.isin(stop_names(one).values, ["horizon", "rest", "limit"])  # not at a singularity
     calm = ended & np.isfinite(magnified) & (other.grazings.values == 0)
     # an accumulation of impacts is cut at a speed that follows the tolerance
     lossless = cases.columns.get("impact.e", np.zeros(len(cases))) == 1.0

@@ -100,7 +100,7 @@ def test_it_has_states_on_every_side(ready):
 def test_lanes_are_the_scalar_kernel(ready):
     system, states, velocity = ready
     ensemble = saltus.simulate_many(system, **states, velocity=velocity, periods=1.4, tol=1e-14)
-    stops = stop_names(ensemble)
+    stops = stop_names(ensemble).values
     for i, state in enumerate(end_state(ensemble, system)):
         motion = saltus.simulate(system, **one(states, velocity, i), periods=1.4, tol=1e-14, dense=False)
         assert (stops[i], int(ensemble.impact_count[i]), int(ensemble.side[i])) == (motion.stop, len(motion.impacts), motion.side)

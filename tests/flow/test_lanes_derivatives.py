@@ -71,7 +71,7 @@ def test_the_determinant_obeys_its_law(family):
     found = np.linalg.det(np.nan_to_num(ensemble.derivative.values))
     size = np.abs(np.nan_to_num(ensemble.derivative.values)).max(axis=(1, 2))
     defined = np.isfinite(ensemble.derivative.values).all(axis=(1, 2))
-    stops, used, wrong, kinds = stop_names(ensemble), 0, [], set()
+    stops, used, wrong, kinds = stop_names(ensemble).values, 0, [], set()
     factor = cases.columns.get("impact.e", np.ones(len(cases)))
     equal_sides = family in ("wall", "rocking", "duffing", "paper")
     for i in range(len(cases)):
@@ -116,6 +116,6 @@ def test_after_rest_there_is_no_derivative_to_the_start_left():
     ensemble = Cases(cases.system, cases.columns, cases.state, cases.velocity, cases.time, {"periods": 6.0}).in_lanes(
         sensitivities=()
     )
-    resting = (stop_names(ensemble) == "rest") & (cases.columns["impact.e"] < 1) & (ensemble.impact_count.values > 0)
+    resting = (stop_names(ensemble).values == "rest") & (cases.columns["impact.e"] < 1) & (ensemble.impact_count.values > 0)
     assert resting.sum() >= 5
     assert not ensemble.derivative.values[resting].any()

@@ -71,7 +71,7 @@ def test_states_samples_and_derivatives_are_those_of_the_free_motion(name, dista
         found = np.stack([ends[f"sampled_{coordinate}"].values[..., n - 1] for coordinate in names], axis=-1)
         expected = exact(matrix, states, n * period)[:, :own]
         np.testing.assert_allclose(found, expected, rtol=0, atol=3e-12)
-    assert set(stop_names(ends)) == {"horizon"}
+    assert set(stop_names(ends).values) == {"horizon"}
     assert (ends.impact_count.values == 0).all()
     slopes = np.broadcast_to(expm(matrix * 3 * period)[: 2 * own, : 2 * own], ends.derivative.shape)
     np.testing.assert_allclose(ends.derivative.values, slopes, rtol=0, atol=1e-11)
@@ -98,7 +98,7 @@ def test_a_motion_settles_as_without_a_wall(distance):
     """On the steady response P sin(w t - phi)."""
     system = System(model=WallOscillator(damping=1.0, wall=distance), load=LOAD, impact=VelocityReduction(0.8))
     end = saltus.simulate_many(system, x=0.2, periods=100, until=("settled",))
-    assert str(stop_names(end)) == "settled"
+    assert str(stop_names(end).values) == "settled"
     stiff, damped = 1 - FREQUENCY**2, FREQUENCY
     assert float(end.x) == pytest.approx(-AMPLITUDE * damped / (stiff**2 + damped**2), abs=1e-9)
 

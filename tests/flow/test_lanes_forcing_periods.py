@@ -49,7 +49,7 @@ def test_what_has_settled_ends_at_the_end_of_its_period():
     """With its derivatives, as after so many periods that were asked for."""
     system, options = forced(C=0.3, H=0.3, W=2.0), {"theta": 0.6, "tol": 1e-13, "sensitivities": ("load.frequency",)}
     ends = saltus.simulate_many(system, periods=400, until="settled", **options)
-    assert str(stop_names(ends)) == "settled"
+    assert str(stop_names(ends).values) == "settled"
     assert float(ends.periods) == round(float(ends.periods)) < 400
     assert float(ends.theta) == float(ends.sampled_theta[-1])
     other = saltus.simulate_many(system, periods=float(ends.periods), **options)

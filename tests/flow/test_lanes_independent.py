@@ -112,7 +112,8 @@ from saltus.taylor.lane_vectors import WIDTH
 cases = FAMILIES["paper"](np.random.default_rng(8), 400)
 ensemble = cases.in_lanes(tol=1e-14, sample=("state", "extrema"))
 state, extrema = end_state(ensemble, cases.system), np.stack([ensemble.largest_theta, ensemble.smallest_theta])
-np.savez(sys.argv[1], width=WIDTH, state=state, extrema=extrema, stop=stop_names(ensemble), impact_count=ensemble.impact_count)
+stop = stop_names(ensemble).values
+np.savez(sys.argv[1], width=WIDTH, state=state, extrema=extrema, stop=stop, impact_count=ensemble.impact_count)
 """
 
 

@@ -42,7 +42,7 @@ def test_a_ball_bounces_slowly_without_leaving_the_lanes(no_scalar_kernel, fligh
     system, start, flight = ball(speed)
     duration = flight.min() * (flights + 0.2)
     ends = saltus.simulate_many(system, duration=duration, **start)
-    assert set(stop_names(ends)) == {"horizon"}
+    assert set(stop_names(ends).values) == {"horizon"}
     done, part = np.divmod(duration / flight + 0.5, 1.0)
     np.testing.assert_array_equal(ends.impact_count, done)
     np.testing.assert_allclose(ends.velocity, speed * (2 * part - 1), rtol=0, atol=1e-12 * flights * THRESHOLD)
@@ -54,7 +54,7 @@ def test_what_may_accumulate_or_chatter_leaves_the_lanes(no_scalar_kernel):
         speeds = np.array([speed, 2.0 * THRESHOLD])
         system, start, flight = ball(speeds, e)
         ends = saltus.simulate_many(system, duration=float(flight.min()), **start)
-        assert stop_names(ends).tolist() == ["not_finite", "horizon"]
+        assert stop_names(ends).values.tolist() == ["not_finite", "horizon"]
 
 
 def test_an_impact_that_changes_the_speed_and_the_next_one_back_loses_nothing(no_scalar_kernel):
@@ -66,7 +66,7 @@ def test_an_impact_that_changes_the_speed_and_the_next_one_back_loses_nothing(no
     first, second = 2 * speed * heavy / pull, 2 * speed * faster / pull  # flights
     duration = 0.02
     ends = saltus.simulate_many(system, theta=speed**2 * heavy / (2 * pull), velocity=0.0, duration=duration, tol=TOL)
-    assert set(stop_names(ends)) == {"horizon"}
+    assert set(stop_names(ends).values) == {"horizon"}
     done, beyond = np.divmod(duration + 0.5 * first, first + second)
     np.testing.assert_array_equal(ends.impact_count, 2 * done + (beyond > first))
     mass = np.where(ends.theta > 0, heavy, 1.0)

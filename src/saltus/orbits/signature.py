@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from saltus.flow import EventCode
+from saltus.notebook import html_table
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +66,11 @@ class Signature:
     events: tuple[ModeChange, ...] = ()
     closed: int = 0
     section: float | None = None
+
+    def _repr_html_(self) -> str:
+        events = self.sides or " ".join(map(str, self.events)) or "none"
+        facts = {"period": self.period, "symmetric": self.symmetric, "impacts": self.impact_count, "sides or events": events}
+        return html_table("Signature", facts)
 
     @property
     def impact_count(self) -> int:

@@ -18,6 +18,7 @@ from saltus.plots.motion import draw_ensemble, draw_motion, draw_sensitivities, 
 from saltus.plots.overturning import draw_fragility, draw_overturning
 from saltus.plots.plane import draw_manifold, draw_plane, draw_separatrix
 from saltus.plots.response import draw_diagram
+from saltus.plots.unit_cell import draw_unit_cell
 
 DRAWINGS: dict[str, Callable[..., Any]] = {
     "attractors": draw_attractors,
@@ -27,6 +28,7 @@ DRAWINGS: dict[str, Callable[..., Any]] = {
     "bifurcation_diagram": draw_diagram,
     "branch": draw_branch,
     "cascade": draw_cascade,
+    "cell": draw_unit_cell,
     "chaotic_bands": draw_chaotic_bands,
     "energies": draw_energies,
     "ensemble": draw_ensemble,

@@ -247,8 +247,12 @@ def unit_in_brackets(variable: Any) -> str:
 
 
 def parameter_name(path: str) -> str:
-    """The name of a parameter on an axis; its dotted path if it has none."""
-    return PARAMETERS.get(path, path)
+    """The name of a parameter on an axis: what it is and whose, as "frequency of the ground horizontal", if it has no symbol."""
+    if path in PARAMETERS or "." not in path:
+        return PARAMETERS.get(path, path)
+    owner, _, own = path.rpartition(".")
+    whose = owner.removeprefix("load.").replace("_", " ").replace(".", " ")
+    return own.replace("_", " ") if owner in ("model", "impact", "load") else f"{own.replace('_', ' ')} of the {whose}"
 
 
 def quantity_name(dataset: Any, quantity: str) -> str:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import PowerNorm
+from matplotlib.colors import ListedColormap, PowerNorm
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from saltus.errors import ParameterError
 from saltus.plots.conventions import (
@@ -204,19 +205,25 @@ OWN = ("period", "state", "column")  # dimensions within one motion, and not of 
 def draw_ensemble(
     dataset: Any, quantity: str | None = None, *, ax: Axes | None = None, width: float = LOOK.single_column
 ) -> Axes:
-    """Draw a variable of `simulate_many`, by default the first coordinate at the end, over one dimension or two; returns `ax`.
+    """Draw a variable of `simulate_many` over one dimension or two; returns `ax`.
+
+    By default that is why the motions ended, where not all ended in the same way, and else the first coordinate at the end.
 
     Raises
     ------
     ParameterError
         A variable that is not there, or that has no dimensions or more than two.
     """
-    quantity = next(iter(dataset.data_vars)) if quantity is None else quantity
+    if quantity is None:
+        several = "stop" in dataset and dataset["stop"].size > 0 and np.ptp(dataset["stop"].values) > 0
+        quantity = "stop" if several else str(next(iter(dataset.data_vars)))
     if quantity not in dataset or not 1 <= dataset[quantity].ndim <= 2 or set(dataset[quantity].dims) & set(OWN):
         raise ParameterError(f"the ensemble has no {quantity!r} over one or two dimensions to draw", "quantity")
     values = dataset[quantity]
     axes = dict(varied(dataset, str(dim)) for dim in values.dims)
     ax = axes_or_new(ax, width, 0.75 * width)
+    if quantity == "stop":
+        return _draw_stops(ax, values, axes)
     label = f"{symbol_of(quantity)}{unit_in_brackets(values)}"
     names = list(axes)
     ax.set_xlabel(names[0])
@@ -227,6 +234,30 @@ def draw_ensemble(
     mesh = ax.pcolormesh(*(cell_edges(axis) for axis in axes.values()), values.values.T, rasterized=True)
     ax.set_ylabel(names[1])
     ax.figure.colorbar(mesh, ax=ax, label=label)
+    return ax
+
+
+STOP_FILLS = ("#bcd2ea", "#f3c98b", "#c9a0c9", "#a9d8b8", "#e9e1a0", "#d9d9d9", "#f2b5b0", "#9fc5c9")
+
+
+def _draw_stops(ax: Axes, values: Any, axes: dict[str, np.ndarray]) -> Axes:
+    """Why motions ended, as a colour for each word with a legend above."""
+    words, numbers, names = values.attrs["flag_meanings"].split(), np.unique(values.values), list(axes)
+    place = np.searchsorted(numbers, values.values)
+    fills = [STOP_FILLS[i % len(STOP_FILLS)] for i in range(len(numbers))]
+    ax.set_xlabel(names[0])
+    if len(names) == 1:
+        for i, fill in enumerate(fills):
+            own = place == i
+            ax.plot(axes[names[0]][own], np.full(np.count_nonzero(own), i), "s", color=fill, mec="none", ms=4.0)
+        ax.set_yticks(range(len(numbers)), [words[number].replace("_", " ") for number in numbers])
+        ax.set_ylim(-0.5, len(numbers) - 0.5)
+        return ax
+    edges = [cell_edges(axis) for axis in axes.values()]
+    ax.pcolormesh(*edges, place.T, cmap=ListedColormap(fills), vmin=-0.5, vmax=len(fills) - 0.5, rasterized=True)
+    ax.set_ylabel(names[1])
+    handles = [Patch(facecolor=fill, label=words[number].replace("_", " ")) for fill, number in zip(fills, numbers, strict=True)]
+    ax.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=min(len(handles), 4), borderaxespad=0.2)
     return ax
 
 

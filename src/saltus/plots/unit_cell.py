@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Any, Literal
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Polygon
 
-from saltus.plots.conventions import LOOK
+from saltus.plots.conventions import LOOK, axes_or_new, drawing
 
 BAR = "#5f6b76"
 FORCE = LOOK.unstable
@@ -17,12 +18,21 @@ ORIGIN = np.array([-0.95, -0.55])  # of the inertial frame, from the lower left 
 ARROW: dict[str, Any] = {"arrowstyle": "-|>,head_width=0.2,head_length=0.45", "lw": 1.1, "shrinkA": 0, "shrinkB": 0}
 
 
+@drawing
+def draw_unit_cell(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column) -> Axes:
+    """Draw the dataset of a `UnitCell` or a `CellLayout`; returns the axes."""
+    ax = axes_or_new(ax, width, 0.9 * width)
+    draw_cell(ax, dataset)
+    return ax
+
+
 def draw_cell(ax: Any, cell: Any, labels: Literal["", "undeformed", "deformed"] = "") -> dict[str, np.ndarray]:
     """Bars, hinges, sliders, spiral springs and masses of one state of a cell; returns its points by name.
 
     `cell` is a Dataset with position(point, axis) and the pairs of point names bar(bar, end) and slider(slider, end); `labels`
     says which names and dimensions are written to it: those of the undeformed state, or those of a deformed one, with its frames.
     """
+    cell = cell.to_xarray() if hasattr(cell, "to_xarray") else cell
     points = dict(zip(cell["point"].values.tolist(), cell["position"].values, strict=True))
     _ground(ax, points)
     for start, end in cell["bar"].values.tolist():

@@ -157,7 +157,7 @@ class Outcomes(NamedTuple):
     @classmethod
     def of(cls, ends: xarray.Dataset) -> Outcomes:
         """The outcomes of an ensemble."""
-        stop = np.asarray(stop_names(ends))
+        stop = stop_names(ends).values
         fallen = np.where(stop == "limit", ends["side"].values, 0).astype(np.int8)
         return cls(fallen, ends["impact_count"].values, stop)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,9 @@ from saltus.public_functions import Numbers
 from saltus.systems.metainterface import Metainterface
 from saltus.systems.si_units import PhysicalCell
 from saltus.systems.two_layer import TwoLayer
+
+if TYPE_CHECKING:
+    import xarray
 
 ANGLE_ROUNDING = 1e-12  # an angle past a limit by no more than this is rounded onto it
 
@@ -279,6 +282,10 @@ class UnitCell:
         phi = (float(self.phi(theta_1)) * misaligned[0], float(self.phi(theta_2)) * misaligned[1])
         return CellLayout.build(self.base, self.lambda_, (self.beta(theta_1), self.beta(theta_2)), phi)
 
+    def to_xarray(self) -> xarray.Dataset:
+        """The undeformed cell as a dataset, which `saltus.plot` draws; `layout(theta_1, theta_2)` has one of each state."""
+        return self.layout().to_xarray()
+
     def metainterface(self) -> Metainterface:
         """The reduced model of this cell; needs `physical`."""
         return self._data().metainterface(self.beta0)
@@ -360,6 +367,18 @@ class CellLayout:
         points |= {"slider_2_in": slider_2[0], "slider_2_out": slider_2[1]}
         points |= {"mass_1": left[1] + edge / 2, "mass_2": left[2] + edge / 2}
         return cls(points)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The points and the names of the parts that join them, as `saltus.plot` draws them."""
+        import xarray
+
+        parts = {
+            "position": (("point", "axis"), np.array(list(self.points.values())), {"units": "l"}),
+            "bar": (("bar", "end"), np.array(self.bars)),
+            "slider": (("slider_number", "end"), np.array(self.sliders)),
+            "spring": ("spring_number", list(self.springs.values())),
+        }
+        return xarray.Dataset(parts, {"point": list(self.points)}, {"kind": "cell", "title": "a unit cell of saltus"})
 
     def segment(self, pair: Pair) -> Point:
         """The two ends of a pair of names, as rows, shape (2, 2)."""

@@ -226,7 +226,7 @@ class _Many:
         if not periods or not len(states):
             return states.copy(), np.zeros(len(states), dtype=bool)
         result = self._follow(states, periods, ("rest", "settled"))
-        stop = stop_names(result)
+        stop = stop_names(result).values
         going = np.isin(stop, (Stop.HORIZON, Stop.REST, Stop.SETTLED, Stop.CAPTURED))
         return np.where(going[:, None], last_states(self.system, result), np.nan), stop == Stop.CAPTURED
 

@@ -210,8 +210,8 @@ def _add_derivatives(writer: _Writer, result: EnsembleResult, paths: tuple[str, 
 
 
 @answered
-def stop_names(dataset: xarray.Dataset) -> np.ndarray[Any, Any]:
-    """Why each motion ended, in the dimensions of the ensemble; the words are those of `Stop`.
+def stop_names(dataset: xarray.Dataset) -> xarray.DataArray:
+    """Why each motion ended, over the dimensions of the ensemble; the words are those of `Stop`.
 
     Parameters
     ----------
@@ -221,12 +221,13 @@ def stop_names(dataset: xarray.Dataset) -> np.ndarray[Any, Any]:
     Examples
     --------
     >>> ends = saltus.simulate_many(system, theta=[0.1, 0.2], periods=2)
-    >>> saltus.flow.stop_names(ends)
+    >>> saltus.stop_names(ends).values
     array(['horizon', 'horizon'], dtype='<U10')
     """
     check_dataset(dataset, "simulate_many", ("stop",))
     stop = dataset["stop"]
-    return np.asarray(np.array(stop.attrs["flag_meanings"].split())[stop.values])
+    words = np.array(stop.attrs["flag_meanings"].split())
+    return stop.copy(data=words[stop.values]).drop_attrs()
 
 
 @answered

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import StrEnum
 from typing import Any, Self, overload
 
 import numpy as np
 
+from saltus.result import RowTable
 from saltus.systems import Model
 
 
@@ -68,7 +69,7 @@ class Event:
 
 
 @dataclass(frozen=True)
-class Impacts:
+class Impacts(RowTable):
     """The impacts of a motion, as arrays of one length.
 
     Attributes
@@ -97,8 +98,15 @@ class Impacts:
     def __len__(self) -> int:
         return self.time.size
 
+    def _table(self) -> dict[str, Any]:
+        columns: dict[str, Any] = {"time": self.time, "side": self.side}
+        for name in ("velocity_before", "velocity_after"):
+            values = getattr(self, name)
+            columns |= {name: values} if values.ndim == 1 else {f"{name}_{i}": values[:, i] for i in range(values.shape[1])}
+        return columns
 
-class MotionEvents(Sequence[Event]):
+
+class MotionEvents(RowTable, Sequence[Event]):
     """The events of a motion in order of time, made one by one from the kernel's arrays."""
 
     def __init__(self, times: np.ndarray, labels: np.ndarray, values: np.ndarray) -> None:
@@ -126,6 +134,17 @@ class MotionEvents(Sequence[Event]):
     def __repr__(self) -> str:
         counts = {kind.value: int(np.sum(self._labels[:, 1] == i)) for i, kind in enumerate(EVENT_KINDS)}
         return f"MotionEvents({', '.join(f'{n} {kind}' for kind, n in counts.items() if n)})"
+
+    def _table(self) -> dict[str, Any]:
+        names = [field.name for field in fields(self[0])] if len(self) else [field.name for field in fields(Event)]
+        columns: dict[str, Any] = {}
+        for name in names:
+            values = [str(value) if isinstance(value, EventKind) else value for value in (getattr(each, name) for each in self)]
+            if values and isinstance(values[0], tuple):
+                columns |= {f"{name}_{i}": [value[i] for value in values] for i in range(len(values[0]))}
+            else:
+                columns[name] = values
+        return columns
 
     def of(self, kind: EventKind) -> Self:
         """The events of one kind."""

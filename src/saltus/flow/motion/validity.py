@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from saltus.notebook import rows_table
 from saltus.systems import System, energy_gain
 
 STEP_SAMPLES = 12  # samples in each step to find changes of sign; a step is shorter than the time scale of a margin
@@ -83,6 +84,13 @@ class Validity:
     def respected(self) -> bool:
         """Whether every margin stays positive throughout, and no impact can gain energy."""
         return not self.gains and all(time is None for time in self.first.values())
+
+    def _repr_html_(self) -> str:
+        rows = {name: "respected" if t is None else f"passed first at {t:.6g}" for name, t in self.first.items()}
+        shares = [f"{100 * self.share[name]:.3g} %" for name in self.first]
+        gained = {name: self.gain(name) for name in self.gains}
+        columns = {"margin": [*rows, *gained], "motion": [*rows.values(), *gained.values()]}
+        return rows_table(columns | {"share of the time": [*shares, *[""] * len(gained)]})
 
     def __str__(self) -> str:
         parts = [

@@ -14,7 +14,7 @@ from saltus.continuation import NEWTON, Course, End
 from saltus.errors import ParameterError
 from saltus.notebook import html_table
 from saltus.orbits.branches.orbit_curve import OrbitPoint
-from saltus.orbits.branches.special_point import OrbitEnd, SpecialPoint
+from saltus.orbits.branches.special_point import OrbitEnd, SpecialPoint, SpecialPoints
 from saltus.orbits.equations.contract import OrbitEquations
 from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.orbit import PeriodicOrbit
@@ -59,6 +59,9 @@ class Branch(Result, Course[OrbitPoint, SpecialPoint]):
 
     path: str
     origin: End = START
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "special", SpecialPoints(self.special))
 
     @property
     def orbits(self) -> list[PeriodicOrbit]:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import StrEnum
+from typing import Any
 
 from saltus.continuation import EndReason, MissedReason, Zero
 from saltus.orbits.orbit import PeriodicOrbit
+from saltus.result import RowTable
 
 UserFunction = Callable[[PeriodicOrbit], float]
 
@@ -148,6 +150,9 @@ class SpecialPoint(Zero):
         """The distance of the orbit from itself a period later, by direct simulation."""
         return self.orbit.defect
 
+    def _repr_html_(self) -> str:
+        return SpecialPoints([self])._repr_html_()
+
     def __repr__(self) -> str:
         place = ", ".join(f"{value:.12g}" for value in self.parameters)
         return (
@@ -155,3 +160,18 @@ class SpecialPoint(Zero):
             f"amplitude={self.amplitude:.9g}, period {self.orbit.period}, {self.orbit.impact_count} impacts, "
             f"bracket {self.evidence.bracket:.1g})"
         )
+
+
+class SpecialPoints(RowTable, tuple[SpecialPoint, ...]):
+    """The special points of a branch, a tuple that is shown as a table."""
+
+    __slots__ = ()
+
+    def _table(self) -> dict[str, Any]:
+        columns: dict[str, Any] = {"kind": [str(point.kind) for point in self]}
+        count = max((len(point.parameters) for point in self), default=1)
+        names = ["parameter"] if count == 1 else [f"parameter_{i}" for i in range(count)]
+        columns |= {name: [point.parameters[i] for point in self] for i, name in enumerate(names)}
+        columns |= {"amplitude": [point.amplitude for point in self], "period": [point.orbit.period for point in self]}
+        columns |= {"impacts": [point.orbit.impact_count for point in self]}
+        return columns | {"bracket": [point.evidence.bracket for point in self]}

@@ -1,0 +1,124 @@
+"""Tables of results: long, never a product of unrelated dimensions, numbers exact, and what a notebook shows."""
+
+import csv
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import saltus
+from saltus.errors import ParameterError
+
+SYSTEM = saltus.System(
+    model=saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1),
+    load=saltus.Load(frequency=1.0, horizontal=saltus.Harmonic(0.5), vertical=-0.5),
+)
+
+
+@pytest.fixture(scope="module")
+def branch():
+    return saltus.continue_orbit(saltus.find_orbit(SYSTEM, theta=0.3), "load.frequency", (0.85, 1.05))
+
+
+@pytest.fixture(scope="module")
+def motion():
+    return saltus.simulate(SYSTEM, theta=0.3, periods=3)
+
+
+def test_a_branch_has_a_row_for_each_point_and_never_their_product_with_other_dimensions(branch):
+    data = branch.to_xarray()
+    assert np.prod(list(data.sizes.values())) > 10 * data.sizes["point"]
+    table = saltus.to_pandas(branch)
+    assert len(table) == data.sizes["point"] == len(branch.points)
+    assert list(table.parameter) == list(branch.parameters)
+    assert len(saltus.to_pandas(branch, "special")) == len(branch.special)
+    with pytest.raises(ParameterError, match=r"there is no table 'specials'; did you mean 'special'\?"):
+        saltus.to_pandas(branch, "specials")
+
+
+def test_an_ensemble_has_a_row_for_each_motion_and_stops_are_words():
+    theta, size = xr.DataArray([0.1, 0.2, 0.3], dims="a"), xr.DataArray([0.02, 0.5], dims="b")
+    ends = saltus.simulate_many(SYSTEM, theta=theta, parameters={"load.horizontal.amplitude": size}, periods=60, until=["rest"])
+    table = saltus.to_pandas(ends)
+    assert len(table) == 6
+    for _, row in table.iterrows():
+        own = ends.isel(a=int(row.a), b=int(row.b))
+        assert (row.theta, row.start_theta, row.impact_count) == (float(own.theta), float(own.start_theta), int(own.impact_count))
+        assert row.stop == str(saltus.stop_names(own).values)
+    stops = saltus.stop_names(ends)
+    assert stops.dims == ("a", "b")
+    assert set(stops.sel(b=0).values) == {"captured"}
+
+
+def test_a_diagram_has_the_tables_of_its_parts():
+    diagram = saltus.bifurcation_diagram(SYSTEM, bounds=(0.85, 0.95), max_period=1, values=[0.9], starts=4, bands=False)
+    table = saltus.to_pandas(diagram)
+    assert len(table) == diagram["points"].sizes["point"]
+    assert list(table.amplitude) == diagram["points"]["amplitude"].values.tolist()
+    assert len(saltus.to_pandas(diagram, "special")) == diagram["special"].sizes["special"]
+    with pytest.raises(ParameterError, match="there is no table 'specal'"):
+        saltus.to_pandas(diagram, "specal")
+
+
+def test_comma_separated_text_has_every_digit(branch, motion, tmp_path):
+    path = saltus.to_csv(tmp_path / "branch.csv", branch)
+    with path.open() as file:
+        assert [float(row["parameter"]) for row in csv.DictReader(file)] == list(branch.parameters)
+    with motion.impacts.to_csv(tmp_path / "impacts.csv").open() as file:
+        assert [float(row["time"]) for row in csv.DictReader(file)] == motion.impacts.time.tolist()
+    assert branch.to_csv(tmp_path / "again.csv").read_bytes() == path.read_bytes()
+
+
+def test_events_impacts_and_special_points_are_tables(branch, motion):
+    events = motion.events.to_pandas()
+    assert list(events.time) == motion.events.times.tolist()
+    assert list(events.kind) == [str(event.kind) for event in motion.events]
+    assert list(motion.impacts.to_pandas().velocity_after) == motion.impacts.velocity_after.tolist()
+    assert list(branch.special.to_pandas().kind) == [str(point.kind) for point in branch.special]
+    several = saltus.System(
+        model=saltus.TwoStops(), load=saltus.Load(frequency=1.0, force=saltus.Harmonic(1.0)), impact=saltus.NewtonImpact(0.5)
+    )
+    stops = saltus.simulate(several, x=0.0, periods=3)
+    assert set(stops.events.to_pandas().contact) <= {"left", "right"}
+    assert len(stops.impacts.to_pandas()) == len(stops.impacts) > 0
+    assert not len(saltus.simulate(several, x=0.0, duration=0.1).events.to_pandas())
+
+
+def test_what_a_notebook_shows_is_a_table_in_html(branch, motion):
+    for shown, word in (
+        (motion.validity, "kinematic_limit"),
+        (branch.special, "line_limit"),
+        (branch.special[0], str(branch.special[0].kind)),
+        (branch.orbits[0].signature, "period"),
+        (motion.impacts, "velocity_before"),
+    ):
+        html = shown._repr_html_()
+        assert html.startswith("<div>")
+        assert word in html
+
+
+def test_progress_in_a_notebook_is_one_line_that_is_written_over(monkeypatch, capsys):
+    shown, updates = [], []
+
+    def display(what, display_id):
+        shown.append(what)
+        return SimpleNamespace(update=updates.append)
+
+    shell = SimpleNamespace(kernel=object())
+    notebook = SimpleNamespace(get_ipython=lambda: shell, display=SimpleNamespace(HTML=lambda text: text, display=display))
+    monkeypatch.setitem(sys.modules, "IPython", notebook)
+    for fraction in (0.0, 0.3, 0.7, 1.0):
+        saltus.show_progress(fraction, "a < b")
+    assert (len(shown), len(updates)) == (1, 3)
+    assert "100 % a &lt; b" in updates[-1]
+    saltus.show_progress(0.1, "again")
+    assert len(shown) == 2
+    saltus.show_progress(1.0, "again")
+    assert capsys.readouterr().err == ""
+
+
+def test_what_is_no_result_is_refused():
+    with pytest.raises(ParameterError, match="result must be a Dataset"):
+        saltus.to_pandas(3)
