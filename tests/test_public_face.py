@@ -31,6 +31,11 @@ WALL = saltus.System(
     impact=saltus.VelocityReduction(0.8),
 )
 CELL = saltus.UnitCell(alpha0=0.3, beta0=1.4)
+BODY = saltus.PhysicalBlock(half_width=0.2, half_height=1.0)
+BLOCK = saltus.System(
+    model=saltus.RockingBlock(alpha=0.2),
+    load=saltus.Load(ground_horizontal=saltus.HalfSine(amplitude=0.5, frequency=2.0, quantity="acceleration")),
+)
 SI = saltus.PhysicalCell(length=0.1, upper_mass=1.0, upper_stiffness=2.0)
 ROOMS = ("attractors", "flow", "orbits", "studies", "sweep", "systems", "theory")
 # Formulas, which are called with numbers, arrays and the symbols of the tracer alike and check nothing; and how orbits are made.
@@ -105,6 +110,11 @@ def good(made):
         "saltus.find_orbit": one,
         "saltus.load": {"path": "/nowhere/result.nc"},
         "saltus.to_mat": {"path": "motion", "result": made["motion"]},
+        "saltus.to_csv": {"path": "motion.csv", "result": made["motion"]},
+        "saltus.to_pandas": {"result": made["motion"]},
+        "saltus.animate": {"result": made["motion"], "path": "film.gif", "seconds": 0.1, "fps": 10.0},
+        "saltus.fragility": {"systems": [BLOCK], "scales": [1.0, 2.0]},
+        "saltus.overturning_spectrum": {"system": BLOCK, "amplitude": [0.3, 0.5], "frequency": [1.0, 2.0]},
         "saltus.show_progress": {"fraction": 0.5, "what": "motions"},
         "saltus.load_study": {"path": "/nowhere/study.toml"},
         "saltus.lyapunov_many": one,
@@ -225,6 +235,11 @@ def good(made):
         "OneSine": (saltus.OneSine, {"amplitude": 0.1, "frequency": 1.0}),
         "PeriodicOrbit.defect_after": (orbit.defect_after, {"rounds": 1}),
         "PeriodicOrbit.motion": (orbit.motion, {}),
+        "Branch.to_csv": (branch.to_csv, {"path": "branch.csv"}),
+        "PhysicalBlock": (saltus.PhysicalBlock, {"half_width": 0.2, "half_height": 1.0}),
+        "PhysicalBlock.load": (BODY.load, {"si": BLOCK.load}),
+        "PhysicalBlock.load_in_si": (BODY.load_in_si, {"load": BLOCK.load}),
+        "PhysicalBlock.system": (BODY.system, {"si": BLOCK.load}),
         "PhysicalCell": (saltus.PhysicalCell, cell_data),
         "PhysicalCell.from_model": (saltus.PhysicalCell.from_model, {"model": SYSTEM.model, **cell_data}),
         "PhysicalCell.load": (SI.load, {"si": SYSTEM.load}),

@@ -79,7 +79,7 @@ def animate(
     """
     file = None if path is None else Path(path)
     writer = None if file is None else _writer(file, fps)
-    check_number("seconds", seconds, above=0.0)
+    check_number("seconds", seconds, above=0.0, at_most=3600.0)
     check_number("fps", fps, above=0.0, at_most=240.0)
     motion = result.motion() if callable(getattr(result, "motion", None)) else result
     if not hasattr(motion, "system") or getattr(motion, "dense", None) is None:

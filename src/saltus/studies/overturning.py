@@ -284,7 +284,7 @@ class OverturningRequest:
     system: System
     amplitude: Any
     frequency: Any
-    borders: bool = True
+    curves: bool = True
     window: Box = WINDOW
     shaken: Shaken = field(init=False)
 
@@ -303,7 +303,7 @@ def overturning_spectrum(
     *,
     amplitude: Iterable[float],
     frequency: Iterable[float],
-    borders: bool = True,
+    curves: bool = True,
     window: Box = WINDOW,
     progress: Progress = silent,
 ) -> xarray.Dataset:
@@ -322,7 +322,7 @@ def overturning_spectrum(
         The amplitudes of the pulse, or the scales of the record, that increase.
     frequency
         The frequencies of the pulse, or the factors of the speed of the record, that increase.
-    borders
+    curves
         Whether to compute the borders.
     window
         A pair (low, high) for the coordinate and one for the velocity: where unstable equilibria are looked for.
@@ -349,12 +349,12 @@ def overturning_spectrum(
     >>> sorted(set(found.border_impacts.values.tolist())), bool(found.border_amplitude.min() > np.tan(0.2))
     ([0, 1], True)
     """
-    request = OverturningRequest(system=system, amplitude=amplitude, frequency=frequency, borders=borders, window=window)
+    request = OverturningRequest(system=system, amplitude=amplitude, frequency=frequency, curves=curves, window=window)
     sizes, rates, shaken = request.amplitude, request.frequency, request.shaken
     progress(0.0, "map")
     grid = np.meshgrid(rates, sizes, indexing="ij")
     cells = shaken.outcomes(grid[0].ravel(), grid[1].ravel())
-    found = _borders(shaken, sizes, rates, cells, part_of(progress, 0.3, 1.0)) if borders else []
+    found = _borders(shaken, sizes, rates, cells, part_of(progress, 0.3, 1.0)) if curves else []
     progress(1.0, "map")
     over, table = ("frequency", "amplitude"), np.concatenate([_no_points(), *found])
     words = [stop.value for stop in Stop]
