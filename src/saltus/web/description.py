@@ -18,7 +18,7 @@ from saltus.web.linker import link
 from saltus.web.objects import kernel_object, structure_object
 
 FREQUENCY = "load.frequency"
-EXPORTED = ("advance", "rewind", "constants", "edges")
+EXPORTED = ("advance", "rewind", "constants", "edges", "margins")
 
 
 def page_parts(system: System) -> tuple[bytes, dict[str, Any]]:

@@ -332,6 +332,16 @@ def edges_function(roots: Sequence[Expr]) -> WrittenFunction:
     )
 
 
+def margins_function(traced: Trace, names: Sequence[str]) -> WrittenFunction:
+    """The function `margins` of a trace that stops at these: their values at a state, with velocities and accelerations behind
+    the coordinates."""
+    rates = [(op, k, i) for k, op in ((1, "velocity"), (2, "acceleration")) for i in range(traced.dof)]
+    behind = {Expr(op, (), i): Expr("coordinate", (), k * traced.dof + i) for op, k, i in rates}
+    roots = [substitute(traced.margins[name], behind) for name in names]
+    places = Places(("t", "origin", "side", "env", "piece", "state", "out"), LEAVES | HERE)
+    return _function("margins", places, [Case(tape(roots, {}), [("out", i) for i in range(len(roots))])])
+
+
 def _table(name: str, places: Places, roots: list[Expr], known: dict[Expr, int]) -> WrittenFunction:
     """A function that fills its last argument with the values of expressions of the parameters."""
     targets = [(places.arguments[-1], i) for i in range(len(roots))]

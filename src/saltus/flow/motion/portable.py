@@ -12,12 +12,14 @@ from typing import Any
 
 import numpy as np
 
+from saltus.errors import SaltusError
 from saltus.flow.contacts.layout import ContactColumn, FrictionColumn
 from saltus.flow.kernel.compiled import (
     MOST_COEFFICIENTS,
     contacts_text,
     edges_function,
     limits_of,
+    margins_function,
     one_contact_text,
     program,
     structure_functions,
@@ -27,7 +29,7 @@ from saltus.flow.kernel.memory import ADVANCE, ADVANCE_CONTACTS, MOTION, SIZES
 from saltus.flow.motion.events import EventKind, Stop
 from saltus.flow.motion.simulate import refusal
 from saltus.systems import Pulse, System, children, substitute
-from saltus.taylor import RECORD_WIDTH, Expr, WrittenFunction, record_table
+from saltus.taylor import RECORD_WIDTH, Expr, Trace, WrittenFunction, record_table, trace
 from saltus.taylor.load_tables import AFTER, SINCE, WITHIN
 
 ENUMERATIONS = (Mode, Status, EventCode, Geometry, ContactColumn, FrictionColumn)
@@ -86,7 +88,17 @@ class PortableMotion:
         places = count()
         twin = substitute(self.system, lambda path, value: Expr("parameter", (), next(places)))
         pulses = [part_at(twin, path) for path in self._pulses]
-        return [*structure_functions(self.run.trace), edges_function([t for p in pulses for t in (p.start, p.start + p.length)])]
+        edges = edges_function([t for p in pulses for t in (p.start, p.start + p.length)])
+        return [*structure_functions(self.run.trace), edges, margins_function(*self._margins())]
+
+    def _margins(self) -> tuple[Trace, tuple[str, ...]]:
+        """A trace with the margins that a page can compute, and their names."""
+        names = self.system.model.margin_names(self.system.load)
+        try:
+            traced = trace(self.system, names)
+        except SaltusError:  # some may compare, which only Python's own check of a motion can
+            return self.run.trace, ()
+        return (traced, names) if traced.records == self.run.trace.records else (self.run.trace, ())
 
     def layout(self) -> dict[str, Any]:
         """Where all numbers are in memory, and what those of the kernel mean."""
@@ -111,6 +123,7 @@ class PortableMotion:
             "contact_numbers": len(trace.contact_numbers),
             "limits": list(self.run.limits),
             "records": self._records(),
+            "margins": list(self._margins()[1]),
             "event_kinds": [str(kind) for kind in EventKind],
             "refusals": {
                 int(status): text for status in Status if (text := refusal(self.system, status, "{time}", "{velocity}"))
@@ -120,7 +133,7 @@ class PortableMotion:
         }
 
     def _records(self) -> dict[str, Any]:
-        """What the load reads of tables in time: of pulses the clock; of records their breakpoints and polynomials."""
+        """What the load reads of tables: of a pulse, which clock it is; of a record, its own breakpoints and polynomials."""
         rows: list[dict[str, Any]] = []
         for path, order in self.run.trace.records:
             if path in self._pulses:

@@ -326,6 +326,24 @@ export class Engine {
   }
 
   /**
+   * The margins at a state with accelerations, by their names.
+   * @param {PageSystem} system @param {number} time @param {number} side @param {ArrayLike<number>} state
+   */
+  margins(system, time, side, state) {
+    const { addresses, layout } = this;
+    for (const name of ["parameters", "constants", "breaks", "table"]) this._put(name, /** @type {any} */ (system)[name]);
+    this._doubles(this.scratch, state.length).set(state);
+    const length = system.period ?? 0;
+    const [period, local] = length ? divmod(time, length) : [0, time];
+    const table = [addresses.table, BigInt(system.breaks.length + 1), BigInt(layout.records.width)];
+    const env = [addresses.parameters, addresses.constants, addresses.breaks, ...table];
+    const piece = BigInt(placeAbove(system.breaks, time));
+    this.exports.margins(local, period * length, side, ...env, piece, this.scratch, this.results);
+    const values = this._doubles(this.results, layout.margins.length);
+    return Object.fromEntries(layout.margins.map((/** @type {string} */ name, /** @type {number} */ i) => [name, values[i]]));
+  }
+
+  /**
    * A motion from a state. A motion that cannot go on is given as far as it goes, with the reason.
    * @param {PageSystem} system
    * @param {{[name: string]: number}} start
@@ -579,6 +597,19 @@ class Steps {
     this.pieces = [];
   }
 
+  /** Coordinates, velocities and accelerations in a step. @param {number} step @param {number} tau */
+  withAccelerations(step, tau) {
+    const { dof, terms, series } = this;
+    const state = new Float64Array(3 * dof);
+    for (let i = 0; i < dof; i++) {
+      const from = (step * dof + i) * terms;
+      state[i] = horner(series, from, terms, tau);
+      state[dof + i] = hornerSlope(series, from, terms, tau);
+      for (let k = terms - 1; k >= 2; k--) state[2 * dof + i] = state[2 * dof + i] * tau + series[from + k] * k * (k - 1);
+    }
+    return state;
+  }
+
   /** Coordinates, then velocities, at a time. @param {number} time */
   state(time) {
     const step = Math.max(placeAbove(this.starts, time) - 1, 0);
@@ -630,6 +661,18 @@ export class PageMotion {
   sideAt(time) {
     if (time >= this.time.last || !this.steps.count) return this.side;
     return this.steps.sides[Math.max(placeAbove(this.steps.starts, time) - 1, 0)];
+  }
+
+  /** The margins of the model at a time, by their names; null at rest, and where there is nothing to evaluate. @param {number} time */
+  margins(time) {
+    const { engine } = this.system;
+    const { steps } = this;
+    if (!engine.layout.margins.length || !steps.count) return null;
+    const step = Math.max(placeAbove(steps.starts, Math.min(time, this.time.last)) - 1, 0);
+    const side = engine.several ? 1 : steps.sides[step];
+    if (side === 0) return null;
+    const at = Math.min(time, this.time.last);
+    return engine.margins(this.system, at, side, steps.withAccelerations(step, at - steps.starts[step]));
   }
 
   /** States at many times, by the names of the variables. @param {ArrayLike<number>} times */
