@@ -11,7 +11,8 @@ from saltus.flow.kernel import layout as kernel_layout
 from saltus.flow.kernel.layout import HIGHEST_ORDER, LOWEST_ORDER, SERIES_LENGTH
 from saltus.flow.lanes import lane_steps, memory
 from saltus.flow.lanes.memory import FLAGS, ROW, SERIES, Gap
-from saltus.taylor import LanesType, compiled_part, lane_memory, lane_vectors, named_tuple, private_numba, shared_as
+from saltus.taylor import compiled_part, lane_memory, lane_vectors, private_numba
+from saltus.taylor.lane_memory import LanesType, named_tuple, shared_as
 from saltus.taylor.lane_vectors import (
     ALL,
     load,

@@ -28,7 +28,7 @@ from saltus.systems import (
     VelocityReduction,
     WallOscillator,
 )
-from saltus.taylor import functions_text
+from saltus.taylor.generated import functions_text
 from saltus.taylor.graph import Expr, differentiate, is_steep
 from saltus.taylor.rules import FUNCTIONS
 from saltus.taylor.tracing import trace

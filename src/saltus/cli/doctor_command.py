@@ -46,7 +46,7 @@ def _machine() -> Block:
 
     from saltus.checks import free_memory
     from saltus.flow import available_cores
-    from saltus.taylor import WIDTH
+    from saltus.taylor.vectors import WIDTH
 
     rows: list[Row] = [
         ("system", platform.platform()),

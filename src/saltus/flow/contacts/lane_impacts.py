@@ -12,7 +12,8 @@ from __future__ import annotations
 
 from saltus.flow.contacts.layout import ContactColumn
 from saltus.flow.lanes.memory import Closing
-from saltus.taylor import absolute, bits, fma, inline_jit, lean_jit, mask, select, splat
+from saltus.taylor import inline_jit, lean_jit
+from saltus.taylor.lane_vectors import absolute, bits, fma, mask, select, splat
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 

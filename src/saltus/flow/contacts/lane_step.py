@@ -17,22 +17,9 @@ from saltus.flow.kernel.layout import Mode
 from saltus.flow.lanes.lane_steps import both_at, commit, find_contact, natural_step, row_step, series_true, state_size, sweep
 from saltus.flow.lanes.memory import FAST, Gap, Step, Stretch
 from saltus.flow.lanes.sampling import keep_ended, pass_ends, record_others, record_range
-from saltus.taylor import (
-    ALL,
-    absolute,
-    bits,
-    first_lane,
-    fma,
-    inline_jit,
-    lane_count,
-    lean_jit,
-    mask,
-    minimum,
-    one,
-    select,
-    splat,
-    vector_lane,
-)
+from saltus.taylor import inline_jit, lean_jit
+from saltus.taylor.lane_memory import one
+from saltus.taylor.lane_vectors import ALL, absolute, bits, first_lane, fma, lane_count, mask, minimum, select, splat, vector_lane
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 

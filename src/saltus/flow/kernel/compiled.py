@@ -23,7 +23,6 @@ from saltus.flow.kernel.memory import ContactsFunctions, OneContactFunctions
 from saltus.flow.one_contact import impacts, kernel
 from saltus.systems import System, numbers
 from saltus.taylor import (
-    SCALAR,
     Case,
     Expr,
     Places,
@@ -47,6 +46,7 @@ from saltus.taylor import (
     tape,
     trace,
 )
+from saltus.taylor.vectors import SCALAR
 
 MOST_COEFFICIENTS = 24  # length of a series at the tightest tolerance: order 21, hence 23 coefficients, rounded up to pairs
 _SIGNATURES = f"""import math

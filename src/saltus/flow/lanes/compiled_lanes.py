@@ -32,8 +32,6 @@ from saltus.flow.lanes.memory import SLOTS, MemoryPlan
 from saltus.flow.one_contact import lane_handoff as one_contact_handoff
 from saltus.flow.one_contact import lane_step
 from saltus.taylor import (
-    LANES,
-    WIDTH,
     Case,
     Expr,
     Places,
@@ -57,6 +55,7 @@ from saltus.taylor import (
     tape,
     vectors,
 )
+from saltus.taylor.vectors import LANES, WIDTH
 
 _TYPES = (kernel_memory, function_types, memory, vectors, lane_memory, lane_vectors)
 _WRITTEN_BY = digest(*(source_of(module) for module in _TYPES))

@@ -25,21 +25,11 @@ from saltus.flow.kernel.layout import Mode, Status
 from saltus.flow.lanes.forcing_periods import arrive, fill, finish, records_of, unresolved
 from saltus.flow.lanes.function_types import RUN_LANES, shared
 from saltus.flow.one_contact.lane_step import step_all
-from saltus.taylor import (
-    ALL,
-    WIDTH,
-    anchor,
-    bits,
-    cached_jit,
-    expand_record,
-    first_lane,
-    inline_jit,
-    lane_count,
-    lean_jit,
-    mask,
-    one,
-    select,
-)
+from saltus.taylor import cached_jit, inline_jit, lean_jit
+from saltus.taylor.lane_memory import one
+from saltus.taylor.lane_vectors import ALL, bits, first_lane, lane_count, mask, select
+from saltus.taylor.load_tables import anchor, expand_record
+from saltus.taylor.vectors import WIDTH
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 

@@ -37,7 +37,8 @@ from saltus.flow.lanes.memory import (
     Slots,
     Work,
 )
-from saltus.taylor import LanesType, LaneType, function_type, named_tuple, shared_as, written_type
+from saltus.taylor import function_type, written_type
+from saltus.taylor.lane_memory import LanesType, LaneType, named_tuple, shared_as
 
 _f, _i = types.float64, types.int64
 _f1, _f2, _f3, _f4 = (types.Array(_f, n, "C") for n in (1, 2, 3, 4))

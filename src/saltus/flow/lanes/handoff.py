@@ -15,7 +15,8 @@ from saltus.flow.kernel.roots import SIMPLE, first_root, horner, scale_gap
 from saltus.flow.lanes.function_types import LANE_ROOT, SCALAR_MOTION, TURNING_RANGE
 from saltus.flow.lanes.memory import NO_ROOT, TOUCH
 from saltus.flow.one_contact.lane_handoff import begin_scalar, end_scalar, event_numbers, functions_of, is_captured, record_events
-from saltus.taylor import cached_jit, jit, lean_jit, own_records
+from saltus.taylor import cached_jit, jit, lean_jit
+from saltus.taylor.load_tables import own_records
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 

@@ -11,18 +11,16 @@ import numpy as np
 
 from saltus.flow.kernel.layout import DEFECT, SMALLEST
 from saltus.flow.lanes.memory import TOUCH
-from saltus.taylor import (
+from saltus.taylor import inline_jit, lean_jit
+from saltus.taylor.lane_memory import one
+from saltus.taylor.lane_vectors import (
     ALL,
-    WIDTH,
     absolute,
     bits,
     fma,
-    inline_jit,
-    lean_jit,
     mask,
     maximum,
     minimum,
-    one,
     rough_exp2,
     rough_inverse,
     rough_log2,
@@ -32,6 +30,7 @@ from saltus.taylor import (
     vector_lane,
     with_lane,
 )
+from saltus.taylor.vectors import WIDTH
 
 
 def step_limits(order: int, tol: float) -> tuple[float, float, float, tuple[float, float, float, float]]:

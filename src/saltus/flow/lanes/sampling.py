@@ -9,21 +9,10 @@ import numpy as np
 
 from saltus.flow.lanes.lane_steps import both_at, motion_at, sweep
 from saltus.flow.lanes.memory import LONGEST_RECURRENCE, Stretch
-from saltus.taylor import (
-    WIDTH,
-    absolute,
-    bits,
-    fma,
-    inline_jit,
-    lean_jit,
-    mask,
-    maximum,
-    minimum,
-    one,
-    select,
-    splat,
-    vector_lane,
-)
+from saltus.taylor import inline_jit, lean_jit
+from saltus.taylor.lane_memory import one
+from saltus.taylor.lane_vectors import absolute, bits, fma, mask, maximum, minimum, select, splat, vector_lane
+from saltus.taylor.vectors import WIDTH
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 

@@ -33,7 +33,7 @@ from saltus.flow.lanes.memory import (
     Work,
 )
 from saltus.progress import Progress, silent
-from saltus.taylor import CACHE_LINE, WIDTH
+from saltus.taylor.vectors import CACHE_LINE, WIDTH
 
 WHAT = "following the motions"  # for the progress
 

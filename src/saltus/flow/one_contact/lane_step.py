@@ -18,7 +18,8 @@ from saltus.flow.lanes.lane_steps import (
 )
 from saltus.flow.lanes.memory import FAST, SMALLEST_SHARE, Gap, Step, Stretch
 from saltus.flow.lanes.sampling import pass_ends, record_others, record_range
-from saltus.taylor import absolute, bits, fma, inline_jit, lean_jit, mask, minimum, select, splat
+from saltus.taylor import inline_jit, lean_jit
+from saltus.taylor.lane_vectors import absolute, bits, fma, mask, minimum, select, splat
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
 
