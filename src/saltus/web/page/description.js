@@ -1,6 +1,7 @@
 /** The description of a system as the page uses it: its numbers, the state with which the page opens, and states from links. */
 
 import { MOST_PERIODS } from "./session.js";
+import { withinBounds } from "./checks.js";
 
 /** @typedef {import("./types.js").Description} Description */
 /** @typedef {import("./types.js").State} State */
@@ -10,13 +11,14 @@ const FIRST_SPEED = 4; // units of time per second
 
 /** What Python wrote, with every group of numbers as entries and with what may be left out filled in. @param {any} written @returns {Description} */
 export function prepared(written) {
-  const known = new Map((written.numbers ?? []).map((/** @type {NumberEntry} */ entry) => [entry.path, entry]));
+  const known = new Map((written.numbers ?? []).map((/** @type {NumberEntry} */ entry) => [entry.path, withinBounds(entry)]));
   const entries = (/** @type {(string|NumberEntry)[]} */ list) =>
     (list ?? []).map((each) => (typeof each === "string" ? known.get(each) : each)).filter(Boolean);
   const margins = written.model.margins ?? [];
   const load = (written.load ?? []).map((/** @type {any} */ each) => ({ ...each, parameters: entries(each.parameters) }));
   const frequency = known.get("load.frequency");
-  if (frequency) load.unshift({ channel: "", kind: "frequency", parameters: [frequency] });
+  const grouped = load.some((/** @type {any} */ each) => each.parameters.includes(frequency));
+  if (frequency && !grouped) load.unshift({ channel: "", kind: "frequency", parameters: [frequency] });
   return {
     ...written,
     model: {

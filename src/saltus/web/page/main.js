@@ -132,6 +132,8 @@ export class Page {
 
   /** Whether a motion can start: null, or the sentence. @param {Record<string, number>} values @param {Record<string, number>} start */
   tried(values, start) {
+    const refused = this.session.refusalOf(values);
+    if (refused) return refused;
     try {
       const system = this.session.engine.system(values);
       this.session.engine.simulate(system, start, 1e-6);

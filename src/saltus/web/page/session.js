@@ -1,6 +1,7 @@
 /** The system and the motion that the page shows, computed from its state by the engine; and what is refused, with its sentence. */
 
 import { clamp } from "./numbers.js";
+import { refusedNumbers } from "./checks.js";
 
 /** @typedef {import("./types.js").Description} Description */
 /** @typedef {import("./types.js").Engine} Engine */
@@ -18,6 +19,8 @@ export class Session {
     this.engine = engine;
     this.description = description;
     this.store = store;
+    const { model, impact, load } = description;
+    this.entries = [...model.parameters, ...(impact?.parameters ?? []), ...load.flatMap(({ parameters }) => parameters)];
     /** @type {import("./types.js").EngineSystem|null} */
     this.system = null;
     /** @type {Motion|null} */
@@ -42,6 +45,8 @@ export class Session {
 
   /** Whether these numbers are accepted: null, or what the engine refuses. @param {Record<string, number>} values */
   refusalOf(values) {
+    const refused = refusedNumbers(this.entries, values);
+    if (refused) return refused;
     try {
       this.engine.system(values);
       return null;
@@ -53,7 +58,12 @@ export class Session {
   /** Make the system and its motion anew. */
   compute() {
     const state = this.store.state;
-    this.refusal = null;
+    this.refusal = this.refusalOf(state.values);
+    if (this.refusal) {
+      this.motion = null;
+      this.curve = emptyCurve();
+      return;
+    }
     try {
       this.system = this.engine.system(state.values);
       this.motion = this.engine.simulate(this.system, state.start, this.duration(state));
@@ -164,6 +174,7 @@ export function plainLoad(description, values, channel, time) {
   let total = 0;
   for (const entry of description.load.filter((each) => each.channel === channel)) {
     const numbers = Object.fromEntries(entry.parameters.map((each) => [each.path.split(".").pop(), values[each.path] ?? 0]));
+    if (entry.kind === "Sum") total += sumAt(entry, values, time);
     if (entry.kind === "Constant") total += values[entry.parameters[0]?.path ?? ""] ?? 0;
     if (entry.kind === "Harmonic") {
       const argument = (numbers.order ?? 1) * rate * time + (numbers.phase ?? 0);
@@ -171,4 +182,17 @@ export function plainLoad(description, values, channel, time) {
     }
   }
   return total;
+}
+
+/** A sum of constants and harmonics, whose terms are numbered in their paths. @param {import("./types.js").LoadEntry} entry @param {Record<string, number>} values @param {number} time */
+function sumAt(entry, values, time) {
+  /** @type {Record<string, Record<string, number>>} */
+  const terms = {};
+  for (const { path } of entry.parameters) {
+    const [, , term = "", name = "mean"] = path.split(".");
+    terms[term] = { ...terms[term], [name]: values[path] ?? 0 };
+  }
+  const rate = values["load.frequency"] ?? 0;
+  const harmonic = (/** @type {Record<string, number>} */ n) => (n.mean ?? 0) + (n.amplitude ?? 0) * Math.sin((n.order ?? 1) * rate * time + (n.phase ?? 0));
+  return Object.values(terms).reduce((sum, term) => sum + harmonic(term), 0);
 }

@@ -1,0 +1,48 @@
+/** Python's own refusals of numbers: the bounds that it was asked for, and its sentences with the numbers of the page in them. */
+
+/** @typedef {import("./types.js").NumberEntry} NumberEntry */
+/** @typedef {{end: number, taken: boolean, of?: string, said: [number, string][]}} Bound */
+
+/** What Python says to these numbers: null, or the first refusal. @param {NumberEntry[]} entries @param {Record<string, number>} values */
+export function refusedNumbers(entries, values) {
+  for (const entry of entries) {
+    const message = refusedNumber(entry, values);
+    if (message) return { where: entry.path, message };
+  }
+  return null;
+}
+
+/** @param {NumberEntry} entry @param {Record<string, number>} values */
+function refusedNumber(entry, values) {
+  const value = values[entry.path] ?? NaN;
+  const { least, most, whole } = entry.accepted ?? {};
+  if (!Number.isFinite(value)) return `${entry.path} must be finite, got ${pythonRepr(value)}`;
+  if (whole && !Number.isInteger(value)) return whole.replace("{value}", pythonRepr(value));
+  return (least && beyond(least, value, -1, values)) || (most && beyond(most, value, 1, values)) || null;
+}
+
+/** @param {Bound} bound @param {number} value @param {number} sign @param {Record<string, number>} values */
+function beyond(bound, value, sign, values) {
+  const end = bound.of === undefined ? bound.end : (values[bound.of] ?? bound.end);
+  const distance = sign * (value - end);
+  if (distance < 0 || (distance === 0 && bound.taken)) return null;
+  const said = bound.said.reduce((last, [from, sentence]) => (from <= distance ? sentence : last), bound.said[0]?.[1] ?? "");
+  return said.replace("{value}", pythonRepr(value)).replace("{other}", String(Number(end.toPrecision(6))));
+}
+
+/** A number as Python writes it. @param {number} value */
+export function pythonRepr(value) {
+  if (Number.isNaN(value)) return "nan";
+  if (!Number.isFinite(value)) return value < 0 ? "-inf" : "inf";
+  const size = Math.abs(value);
+  const text = size >= 1e16 || (size > 0 && size < 1e-4) ? value.toExponential() : String(value);
+  return text.replace(/e([+-])(\d)$/, "e$10$2");
+}
+
+/** The range of a slider within what Python takes. @param {NumberEntry} entry @returns {NumberEntry} */
+export function withinBounds(entry) {
+  const { least, most } = entry.accepted ?? {};
+  const low = least && !least.of ? Math.max(entry.low, least.end) : entry.low;
+  const high = most && !most.of ? Math.min(entry.high, most.end) : entry.high;
+  return low < high ? { ...entry, low, high } : entry;
+}
