@@ -18,6 +18,7 @@ PAGE = Path(__file__).parent / "page"  # the page's own sources
 IMPORT = re.compile(r'^import \{([^}]*)\} from "\./([\w]+)\.js";\n', re.MULTILINE)
 EXPORT = re.compile(r"^export (?:async )?(?:function|class|const) (\w+)", re.MULTILINE)
 COMMENT = re.compile(r"[ \t]*/\*\*.*?\*/\n?", re.DOTALL)
+LINE = re.compile(r"^\s*//.*\n|^[ \t]+|(?<=[;,{]) // .*$", re.MULTILINE)  # lines of comments, indents, comments behind code
 
 
 def one_file(description: Mapping[str, Any], wasm: bytes, *, entry: Path = PAGE / "boot.js") -> str:
@@ -40,8 +41,8 @@ def one_file(description: Mapping[str, Any], wasm: bytes, *, entry: Path = PAGE 
         "title": html.escape(str(description.get("title") or description["model"]["name"])),
         "style": style,
         "description": json.dumps(description, allow_nan=False).replace("<", "\\u003c"),
-        "wasm": base64.b64encode(gzip.compress(wasm, 9, mtime=0)).decode(),
-        "worker": worker,
+        "wasm": _packed(wasm),
+        "worker": _packed(worker.encode()),
         "script": script,
     }
     return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], (PAGE / "page.html").read_text())
@@ -63,7 +64,7 @@ def _collect(path: Path, texts: dict[Path, str], above: tuple[Path, ...]) -> Non
         raise ValueError(f"{path.name} imports itself through {', '.join(each.name for each in above)}")
     if path in texts:
         return
-    source = COMMENT.sub("", path.read_text())
+    source = LINE.sub("", COMMENT.sub("", path.read_text()))
     for _, name in IMPORT.findall(source):
         _collect(_beside(path, name), texts, (*above, path))
     texts[path] = source
@@ -80,8 +81,12 @@ def _wrapped(path: Path, source: str) -> str:
     if re.search(r"^import\b|^export (?:default|\{|\*)", body, re.MULTILINE):
         raise ValueError(f"{path.name}: only `import {{ names }} from './module.js'` and exported declarations can be joined")
     names = EXPORT.findall(body)
-    body = re.sub(r"^export (?!\{)", "", body, flags=re.MULTILINE).replace("{};\n", "", 0)
+    body = re.sub(r"^export (?!\{)", "", body, flags=re.MULTILINE)
     return f"const module_{path.stem} = (() => {{\n{body.strip()}\nreturn {{{', '.join(names)}}};\n}})();"
+
+
+def _packed(content: bytes) -> str:
+    return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
 
 
 def _policy(script: str, style: str) -> str:

@@ -16,9 +16,9 @@ export async function unpacked(text) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-/** A worker of the text that stands in the page. @returns {any} */
-function makeWorker() {
-  const address = URL.createObjectURL(new Blob([block("worker")], { type: "text/javascript" }));
+/** A worker of the text that stands in the page. @param {Uint8Array} text @returns {any} */
+function workerOf(text) {
+  const address = URL.createObjectURL(new Blob([/** @type {any} */ (text)], { type: "text/javascript" }));
   const worker = new Worker(address);
   URL.revokeObjectURL(address);
   return worker;
@@ -29,9 +29,10 @@ async function boot() {
   try {
     const written = JSON.parse(block("description"));
     const description = prepared(written);
-    const wasm = await unpacked(block("wasm"));
-    const engine = await open(wasm, written);
-    Object.assign(globalThis, { saltusPage: new Page({ engine, description, makeWorker, wasm }) });
+    const [wasm, worker] = await Promise.all(["wasm", "worker"].map((id) => unpacked(block(id))));
+    const makeWorker = () => workerOf(/** @type {Uint8Array} */ (worker));
+    const engine = /** @type {any} */ (await open(/** @type {Uint8Array} */ (wasm), written));
+    Object.assign(globalThis, { saltusPage: new Page({ engine, description, makeWorker, wasm: wasm ?? null }) });
   } catch (error) {
     if (!notice) return;
     notice.hidden = false;

@@ -3,6 +3,8 @@
 /** @typedef {import("./types.js").NumberEntry} NumberEntry */
 /** @typedef {{end: number, taken: boolean, of?: string, said: [number, string][]}} Bound */
 
+const ASIDE = 60; // A slider keeps this share of its range from an end that is not taken.
+
 /** What Python says to these numbers: null, or the first refusal. @param {NumberEntry[]} entries @param {Record<string, number>} values */
 export function refusedNumbers(entries, values) {
   for (const entry of entries) {
@@ -42,7 +44,10 @@ export function pythonRepr(value) {
 /** The range of a slider within what Python takes. @param {NumberEntry} entry @returns {NumberEntry} */
 export function withinBounds(entry) {
   const { least, most } = entry.accepted ?? {};
-  const low = least && !least.of ? Math.max(entry.low, least.end) : entry.low;
-  const high = most && !most.of ? Math.min(entry.high, most.end) : entry.high;
+  const least_ = least && !least.of ? Math.max(entry.low, least.end) : entry.low;
+  const most_ = most && !most.of ? Math.min(entry.high, most.end) : entry.high;
+  const aside = (most_ - least_) / ASIDE;
+  const low = least && !least.taken && least_ === least.end ? least_ + aside : least_;
+  const high = most && !most.taken && most_ === most.end ? most_ - aside : most_;
   return low < high ? { ...entry, low, high } : entry;
 }

@@ -1,3 +1,4 @@
+// @ts-nocheck: the types of what the memory holds are those of the tables that Python writes.
 // The engine of the page: packs a system into the memory of the kernel, runs it, and reads motions out of it.
 //
 // All equations are in the WebAssembly that Python made of the model: this file knows no model. Where a number lies in memory, and

@@ -44,6 +44,8 @@ export class Sweep {
     try {
       for (const [name, list] of /** @type {const} */ ([["up", along], ["down", [...along].reverse()]])) {
         for (const value of list) {
+          const refused = this.session.refusalOf({ ...values, [sweep.path]: value });
+          if (refused) throw new Error(refused.message);
           const point = settled(this.session, engine, { ...values, [sweep.path]: value }, state, sweep.periods, coordinate);
           state = point.next;
           this.result[name].push({ value, amplitude: point.amplitude, state: point.state, stop: point.stop });
