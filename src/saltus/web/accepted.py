@@ -17,7 +17,6 @@ MARK, OTHER = "{value}", "{other}"  # stand in a sentence for the value, and for
 # and ends near the second and the fifth of them.
 TRIED = (0.0070173, 3.2000173, 7.0170173, 70.170173, 360.00173, 7017.0173, 7.0170173e6, 7.0170173e12)
 TRIED_WHOLE = (173.0, 7017.0, 7017017.0)
-NEAR = 1e-9  # an end nearer than this to a simple number or to another number of the system is that number
 
 
 def accepted(system: System) -> dict[str, dict[str, Any]]:
@@ -76,7 +75,7 @@ class _Asked:
             middle = float(math.floor((taken + refused) / 2))
             taken, refused = (middle, refused) if self.refusal(middle) is None else (taken, middle)
         others = [x for path, x in numbers(self.system) if path != self.path]
-        simple = [x for x in (float(round(taken)), math.pi, math.pi / 2, *others) if abs(x - taken) < NEAR]
+        simple = [x for x in (float(round(taken)), math.pi, math.pi / 2, *others) if math.isclose(x, taken, abs_tol=1e-9)]
         end = simple[0] if simple else taken
         return {"end": end, "taken": self.refusal(end) is None}
 
@@ -94,7 +93,7 @@ class _Asked:
     def _follow(self, bound: dict[str, Any]) -> None:
         """Find out whether another number of the system is the bound: then the bound moves with it."""
         for path, value in numbers(self.system):
-            if path == self.path or value == 0.0 or abs(value - bound["end"]) > NEAR:
+            if path == self.path or value == 0.0 or not math.isclose(value, bound["end"], abs_tol=1e-9):
                 continue
             moved = value + math.copysign(0.0625, self.value - value)
             if self.refusal(value + 2 * (moved - value)) is None and _refusal(

@@ -11,6 +11,7 @@ from saltus.errors import ParameterError
 from saltus.files import check_writable, write_text
 from saltus.public_functions import Numbers
 from saltus.systems import System, arguments_of, check_system, on_this_side, read_start, rest_state
+from saltus.web.accepted import accepted
 from saltus.web.description import page_parts
 from saltus.web.one_file import one_file
 from saltus.web.results import digest, results_as_json
@@ -86,7 +87,9 @@ def page(
     check_writable(file.parent)
     content, described = page_parts(system)
     simulate = {**arguments_of(system, state), **asked, "tol": tol} | ({"time": time} if time else {})
+    bounds = accepted(system)
     described |= {
+        "numbers": [entry | {"accepted": bounds[entry["path"]]} for entry in described["numbers"]],
         "title": title or type(system.model).__name__,
         "start": {"time": float(time), **dict(zip(_state_names(system), map(float, state), strict=True))},
         "study": {"system": system.to_dict(), "simulate": simulate},

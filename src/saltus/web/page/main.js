@@ -68,9 +68,10 @@ export class Page {
 
   makeHead() {
     const { description, store } = this;
-    document.title = description.title || description.model.name;
-    at("title").textContent = description.title || spaced(description.model.name);
-    at("subtitle").textContent = description.title ? spaced(description.model.name) : "";
+    const own = description.title && description.title !== description.model.name ? description.title : "";
+    document.title = own || spaced(description.model.name);
+    at("title").textContent = document.title;
+    at("subtitle").textContent = own ? spaced(description.model.name) : "";
     const theme = /** @type {HTMLSelectElement} */ (at("theme"));
     theme.value = store.state.theme;
     theme.addEventListener("change", () => store.set({ theme: /** @type {any} */ (theme.value) }));
