@@ -2,7 +2,7 @@
 const browser = ["document", "window", "globalThis", "location", "history", "navigator", "matchMedia", "addEventListener",
   "requestAnimationFrame", "getComputedStyle", "setTimeout", "clearTimeout", "performance", "URL", "Blob", "Response", "Worker",
   "DecompressionStream", "Option", "HTMLElement", "HTMLSelectElement", "HTMLInputElement", "atob", "structuredClone", "WebAssembly", "self",
-  "postMessage", "onmessage", "console", "process", "Event"];
+  "postMessage", "onmessage", "Buffer", "console", "process", "Event"];
 
 export default [
   {
@@ -13,7 +13,7 @@ export default [
       "no-var": "error", "no-eval": "error", "no-implied-eval": "error", "no-new-func": "error", "no-shadow": "off",
       "no-unsafe-finally": "error", "no-unreachable": "error", "no-dupe-keys": "error", "no-fallthrough": "error",
       "no-restricted-properties": ["error", ...["innerHTML", "outerHTML", "insertAdjacentHTML"].map((property) => ({ property }))],
-      "max-lines": ["error", 650], "max-lines-per-function": ["error", 60], complexity: ["error", 24],
+      "max-lines": ["error", 700], "max-lines-per-function": ["error", 60], complexity: ["error", 24],
     },
   },
 ];
