@@ -201,7 +201,6 @@ def test_along_both_layers_a_branch_goes_on_beyond_where_impacts_die_away_only_a
     """Just above the range of the other tests, where special points follow each other closely."""
     branch = saltus.continue_orbit(layers.orbits[0], "load.horizontal.amplitude", (0.15, 0.9))
     assert kinds_of(branch)[:4] == ["SW", "SW", "RL", "CH"]
-    assert branch.ends[1].parameter == 0.9
 
 
 def test_along_both_layers_releases_appear(layers: saltus.Branch) -> None:
