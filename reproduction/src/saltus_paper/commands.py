@@ -21,7 +21,7 @@ def reproduce(
     output: Annotated[Path, typer.Option("--output", "-o", help="The folder to write to.")] = RESULTS,
     force: Annotated[bool, typer.Option("--force", help="Make again what is up to date.")] = False,
     effort: Annotated[
-        str, typer.Option("--effort", help="quick: a draft of the whole report in less than a third of the time, marked as such.")
+        str, typer.Option("--effort", help="quick: a draft of the whole report in about two fifths of the time, marked as such.")
     ] = "standard",
     list_: Annotated[bool, typer.Option("--list", help="List the parts and stop.")] = False,
 ) -> None:

@@ -7,6 +7,7 @@ the refusals are kept with marks in the places of the numbers.
 from __future__ import annotations
 
 import math
+import warnings
 from typing import Any
 
 from saltus.errors import SaltusError, shown
@@ -104,7 +105,9 @@ class _Asked:
 
 def _refusal(system: System, changes: dict[str, float]) -> str | None:
     try:
-        system.with_({path: int(x) if path.endswith(".order") and x.is_integer() else x for path, x in changes.items()})
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # nobody means the values that are tried
+            system.with_({path: int(x) if path.endswith(".order") and x.is_integer() else x for path, x in changes.items()})
     except SaltusError as error:
         return str(error)
     return None

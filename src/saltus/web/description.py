@@ -46,10 +46,10 @@ def description(motion: PortableMotion) -> dict[str, Any]:
     size = len(model.coordinates)
     units = [model.unit_of(name) for name in model.coordinates]
 
-    def below(part: Any, where: str) -> list[dict[str, Any]]:
-        return [entries[path] for path, _ in numbers(part, where)]
+    def below(part: Any, where: str) -> list[str]:
+        return [path for path, _ in numbers(part, where)]
 
-    frequency = [{"channel": "", "kind": "frequency", "parameters": [entries[FREQUENCY]]}] if FREQUENCY in entries else []
+    frequency = [{"channel": "", "kind": "frequency", "parameters": [FREQUENCY]}] if FREQUENCY in entries else []
     return {
         "version": saltus.__version__,
         "model": {

@@ -13,7 +13,7 @@ const FIRST_SPEED = 4; // units of time per second
 export function prepared(written) {
   const known = new Map((written.numbers ?? []).map((/** @type {NumberEntry} */ entry) => [entry.path, withinBounds(entry)]));
   const entries = (/** @type {(string|NumberEntry)[]} */ list) =>
-    (list ?? []).map((each) => (typeof each === "string" ? known.get(each) : each)).filter(Boolean);
+    (list ?? []).map((each) => (typeof each === "string" ? known.get(each) : (known.get(each.path) ?? withinBounds(each)))).filter(Boolean);
   const margins = written.model.margins ?? [];
   const load = (written.load ?? []).map((/** @type {any} */ each) => ({ ...each, parameters: entries(each.parameters) }));
   const frequency = known.get("load.frequency");

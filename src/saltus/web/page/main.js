@@ -325,6 +325,8 @@ export class Page {
   }
 
   drawAll() {
+    const energy = at("view-energy").closest("figure");
+    if (energy) energy.hidden = this.session.motion !== null && !this.session.motion?.energy; // not every engine gives it
     this.stage.draw();
     for (const { plot } of this.plots) plot.draw();
     this.transport.show();
