@@ -46,7 +46,7 @@ def test_texts_of_a_study_are_never_markup():
     hostile = stand_in.wall() | {"title": '</script><script>alert("1")</script>{{script}}'}
     page = stand_in.page_of(hostile)
     assert "<script>alert" not in page
-    assert page.count("<script") == 4  # the description, the engine, the worker and the one module
+    assert page.count("<script") == 5  # the description, the engine, the worker, the joined modules and what unpacks them
     assert "default-src 'none'" in page
 
 
