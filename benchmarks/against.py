@@ -77,7 +77,8 @@ def sources_of(commit: str) -> Iterator[Path]:
         packed = subprocess.run(["git", "archive", commit, "src"], cwd=ROOT, check=True, capture_output=True).stdout
         subprocess.run(["tar", "x", "-C", folder], input=packed, check=True)
         sources = Path(folder) / "src"
-        compileall.compile_dir(sources, quiet=2)  # as an installation has it
+        for folder_of_sources in (sources, ROOT / "src"):  # as an installation has them
+            compileall.compile_dir(folder_of_sources, quiet=2)
         yield sources
 
 

@@ -363,6 +363,14 @@ def test_the_front_door_is_light(statement: str) -> None:
     assert result.stdout.strip() == "[]"
 
 
+def test_the_help_of_the_command_line_imports_no_numpy() -> None:
+    """It took twice as long with it; what other packages add to the commands is imported too."""
+    program = "import sys; from typer.testing import CliRunner; import saltus.cli; from saltus.cli.app import app;"
+    shown = f"{program} CliRunner().invoke(app, ['--help'], catch_exceptions=False); print('numpy' in sys.modules)"
+    result = subprocess.run([sys.executable, "-c", shown], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "False"
+
+
 SCRIPTS = sorted((SOURCE.parents[1] / "examples").glob("*.py"))
 LONGEST = {"chaos.py", "basins.py", "response_spectrum.py"}  # seconds each; the gallery of `make docs` runs all of them
 

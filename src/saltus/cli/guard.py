@@ -8,14 +8,12 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, NoReturn
-
-from rich.console import Console
-from rich.progress import BarColumn, SpinnerColumn, TextColumn, TimeElapsedColumn
-from rich.progress import Progress as Bar
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from saltus.errors import SaltusError, shortened
-from saltus.progress import Progress
+
+if TYPE_CHECKING:  # `saltus --help` imports no NumPy
+    from saltus.progress import Progress
 
 BAD_INPUT, INTERRUPTED = 2, 130  # the second is 128 + SIGINT, as shells have it
 INTERRUPTION = "interrupted; no file was left half-written"
@@ -120,6 +118,10 @@ def progress_bar(title: str) -> Iterator[Progress]:
     >>> with progress_bar("spectrum") as progress:
     ...     ends = saltus.simulate_many(system, theta=[0.1, 0.3], periods=10, progress=progress)
     """
+    from rich.console import Console
+    from rich.progress import BarColumn, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bar
+
     messages, step = Console(stderr=True, highlight=False), ""
     columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), BarColumn(bar_width=20), TimeElapsedColumn())
     with Bar(*columns, console=messages, transient=True, disable=not messages.is_terminal) as bar:
