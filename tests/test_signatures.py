@@ -25,16 +25,22 @@ ALIKE = {
 }
 # Names with two meanings, which are those of the field in both: what a dimension, a figure of a formula or a file is called.
 SEVERAL = {
+    "changes": "values by dotted path, or parts of a system too",
     "coordinates": "starts of one motion or of many, by the names of the model's coordinates",
     "curves": "whether basins have their boundaries, or how many borders of a chart are followed",
+    "data": "what was measured, or a system as a dictionary",
     "e": "a coefficient of restitution, one or a matrix of several contacts",
+    "functions": "quantities by name: of an orbit, of a motion, or of a motion at the times of a record",
     "known": "attractors, orbits or branches",
     "parameters": "values by dotted path, or the paths to differentiate to or to solve for",
     "path": "a parameter's dotted path, or that of a file",
     "periods": "forcing periods; of one motion also a fraction",
     "result": "one result, or to be drawn also several",
     "special": "one special point, or seeds of several",
+    "start": "when a pulse begins, or the state with which a record begins",
     "starts": "how many initial states, or, of a phase portrait, which",
+    "time": "when a motion begins, or the times of a record",
+    "values": "of a parameter, or what was measured, or the unknowns of a fit",
 }
 # By which arguments a function takes names of its own: those of a model's coordinates, of a load's channels, of parameters, and
 # those of the function that draws.

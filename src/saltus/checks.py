@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError, shown
+from saltus.errors import ParameterError, SaltusError, shown
 
 RADIANS = {"unit": "rad"}  # the metadata of a dataclass's field that is an angle
 
@@ -355,3 +355,18 @@ def settle_numbers(owner: Any, *names: str, **bounds: Any) -> None:
     for name in names:
         check_number(name, getattr(owner, name), unit=units[name], **bounds)
         object.__setattr__(owner, name, float(getattr(owner, name)))
+
+
+def check_environment() -> None:
+    """Refuse settings that would make numba fail with its own message when it is imported, or, without its compiler, much later.
+
+    Raises
+    ------
+    SaltusError
+        NUMBA_DISABLE_JIT is set, or NUMBA_NUM_THREADS is no count.
+    """
+    disabled, threads = os.environ.get("NUMBA_DISABLE_JIT", "0"), os.environ.get("NUMBA_NUM_THREADS", "1")
+    if disabled not in ("", "0"):
+        raise SaltusError("the environment has NUMBA_DISABLE_JIT set, but saltus is nothing without its compiler; unset it")
+    if not (threads.isdecimal() and int(threads) > 0):
+        raise SaltusError(f"the environment has NUMBA_NUM_THREADS={threads[:20]!r}, which is no number of threads; unset it")

@@ -16,7 +16,7 @@ from saltus.config.study import QUESTIONS, Ask, functions_of, keys_of
 from saltus.errors import ParameterError
 
 KEYS = {kind: set(keys_of(kind)) for kind in QUESTIONS}
-FOR_PYTHON_ALONE = {"system", "progress", "store", "workers", "scheduler", "compute", "found", "known", "also"}
+FOR_PYTHON_ALONE = {"system", "progress", "store", "workers", "scheduler", "compute", "found", "known", "also", "functions"}
 
 
 @pytest.mark.parametrize("kind", QUESTIONS)

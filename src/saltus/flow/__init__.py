@@ -6,5 +6,7 @@ many motions, up to millions. Names are imported at their first use: one motion 
 """
 
 from saltus._front_door import front_door
+from saltus.checks import check_environment
 
+check_environment()  # before files of this room import numba
 __getattr__, __dir__, __all__ = front_door(__name__, __file__)

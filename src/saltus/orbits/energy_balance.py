@@ -58,9 +58,9 @@ def energies(of: Followed, *, periods: int | None = None) -> xarray.Dataset:
 
     Examples
     --------
-    >>> balance = saltus.energies(saltus.find_orbit(wall, x=0.5))
+    >>> balance = saltus.energies(orbit)
     >>> [str(name) for name in balance.part.values]
-    ['load.force', 'damping', 'impact', 'kinetic', 'potential']
+    ['load.horizontal', 'load.vertical', 'damping', 'impact', 'kinetic', 'potential']
     >>> bool(abs(balance.defect) < 1e-12)
     True
     """

@@ -14,7 +14,7 @@ from matplotlib.patches import Circle, Polygon
 
 from saltus.checks import check_number
 from saltus.errors import ParameterError, shown
-from saltus.plots.conventions import LOOK, new_figure, style, symbol, unit_in_brackets
+from saltus.plots.conventions import LOOK, NARROWEST, WIDEST, new_figure, style, symbol, unit_in_brackets
 from saltus.plots.motion import LINES, PAIRS, arcs, coordinates
 from saltus.progress import Progress, silent
 from saltus.systems import drawing_of
@@ -81,6 +81,7 @@ def animate(
     writer = None if file is None else _writer(file, fps)
     check_number("seconds", seconds, above=0.0, at_most=3600.0)
     check_number("fps", fps, above=0.0, at_most=240.0)
+    check_number("width", width, at_least=NARROWEST, at_most=WIDEST, unit="mm")
     motion = result.motion() if callable(getattr(result, "motion", None)) else result
     if not hasattr(motion, "system") or getattr(motion, "dense", None) is None:
         raise ParameterError(f"result must be a motion that was kept densely, or an orbit, got {shown(result)}", "result")

@@ -34,10 +34,10 @@ def accepted(system: System) -> dict[str, dict[str, Any]]:
     system
         The system; its own numbers are taken.
     """
-    return {path: _Asked(system, path, value).bounds() for path, value in numbers(system)}
+    return {path: _NumberBounds(system, path, value).bounds() for path, value in numbers(system)}
 
 
-class _Asked:
+class _NumberBounds:
     """One number of a system, and what Python says to other values of it."""
 
     def __init__(self, system: System, path: str, value: float) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from saltus.checks import check_number
 from saltus.errors import ParameterError
 from saltus.files import check_writable, write_text
 from saltus.public_functions import Numbers
@@ -79,8 +80,12 @@ def page(
     file = Path(f"{type(system.model).__name__}.html" if path is None else path)
     if file.suffix.lower() not in (".html", ".htm"):
         raise ParameterError(f"path must be the name of a page, such as 'study.html', got {str(path)!r:.80}", "path")
+    check_number("tol", tol, at_least=1e-15, at_most=1e-6)
+    check_number("time", time)
     length = {"periods": periods, "duration": duration}
     asked = {name: float(value) for name, value in length.items() if value is not None}
+    for name, value in asked.items():
+        check_number(name, value, above=0.0)
     if not asked:
         kind = "duration" if system.load.period is None else "periods"
         asked = {kind: AT_START[kind]}
