@@ -112,7 +112,7 @@ def good(made):
         "saltus.to_mat": {"path": "motion", "result": made["motion"]},
         "saltus.to_csv": {"path": "motion.csv", "result": made["motion"]},
         "saltus.to_pandas": {"result": made["motion"]},
-        "saltus.animate": {"result": made["motion"], "path": "film.gif", "seconds": 1.0, "fps": 1.0},
+        "saltus.animate": {"result": made["motion"], "path": "film.gif", "seconds": 0.1, "fps": 0.1},
         "saltus.fragility": {"systems": [BLOCK], "scales": [1.0, 2.0]},
         "saltus.overturning_spectrum": {"system": BLOCK, "amplitude": [0.3, 0.5], "frequency": [1.0, 2.0]},
         "saltus.show_progress": {"fraction": 0.5, "what": "motions"},
