@@ -184,7 +184,7 @@ def page(
 
     The page needs no server, no network and no Python: sliders change every
     number of the system, and the motion with them. The first page takes some
-    ten seconds of compiling. A model of your own is Python code, and is run.
+    twenty seconds of compiling. A model of your own is Python code, and is run.
 
     Example: [cyan]saltus page study.toml --with results/study/basins.nc[/]
     """

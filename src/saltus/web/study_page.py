@@ -35,7 +35,7 @@ def page(
     """A page that computes: the exact motion of a system in a browser, as one HTML file that needs no server and no network.
 
     The kernel and the model are compiled to WebAssembly, so that the motion is that of `simulate`; sliders change every number of
-    the system. The first page of a version takes some ten seconds of compiling, each further one below a second.
+    the system. The first page of a version takes some twenty seconds of compiling, each further one about one.
 
     Parameters
     ----------
