@@ -20,6 +20,17 @@ def test_a_branch_holds_its_own_orbits_beside_its_narrow_peak():
     assert all(placed.holds(orbit, value) for orbit, value in found)
 
 
+def test_stable_parts_end_at_the_special_points_where_stability_is_lost():
+    """Motions are begun just beyond the ends: beyond a point at which an orbit doubles, and not short of it."""
+    branch = continue_orbit(find_orbit(forced(0.2, 2.08925), theta=0.05, velocity=0.05), FREQUENCY, (0.7, 2.2))
+    placed = PlacedBranch(branch)
+    ends, stable = placed.stable_ends, branch.stable
+    assert np.isin(branch.parameters[ends], [special.parameter for special in branch.special]).all()
+    assert len(ends) == np.count_nonzero(stable[:-1] != stable[1:])
+    assert not stable[ends].any()
+    assert (stable[ends - 1] != stable[ends + 1]).all()
+
+
 def test_chaotic_motions_that_return_by_chance_are_soon_given_up():
     """Chance rarely lets a chaotic motion return ever nearer: few of those taken as slow are followed to the last round."""
     system, counts, n, periods = forced(0.2, 0.38), [], 200, 100

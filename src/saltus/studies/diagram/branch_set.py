@@ -58,6 +58,16 @@ class PlacedBranch:
         return np.array([self.branch.is_joined(i) for i in range(len(self.branch.points) - 1)], dtype=bool)
 
     @cached_property
+    def stable_ends(self) -> np.ndarray:
+        """Where stability changes along the branch: the indices of the special points there, which are not stable themselves, or
+        of the last stable points where there is none, (n,)."""
+        stable, special = self.columns[3] > 0, np.isin(self.columns[0], [each.parameter for each in self.branch.special])
+        before = np.flatnonzero(stable[:-1] != stable[1:])
+        last = np.where(stable[before], before, before + 1)
+        beyond = 2 * before + 1 - last
+        return np.unique(np.where(special[beyond], beyond, last))
+
+    @cached_property
     def _joins(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The points that a smooth curve joins to the next one, and the least and the largest parameter between the two, (m,)."""
         parameter, usable = self.columns[0], np.flatnonzero(self.joined)

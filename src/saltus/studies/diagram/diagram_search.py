@@ -234,9 +234,8 @@ class DiagramSearch:
         found: list[tuple[float, np.ndarray]] = []
         low, high = self.bounds
         for branch in branches:
-            stable = branch.columns[3] > 0
-            for last in np.flatnonzero(stable & ~(np.append(stable[1:], True) & np.append(True, stable[:-1]))):
-                value, orbit = float(branch.columns[0, last]), branch.branch.points[last].orbit
+            for end in branch.stable_ends.tolist():
+                value, orbit = float(branch.columns[0, end]), branch.branch.points[end].orbit
                 steps = [side * share * (high - low) for share in SETTINGS.beyond for side in (-1.0, 1.0)]
                 found += [(value + step, orbit.section_state) for step in steps if low <= value + step <= high]
         values = np.array([value for value, _ in found], dtype=float)
