@@ -6,6 +6,7 @@ A block of 0.8 m by 4 m under a ground acceleration that is read from an AT2 fil
 exceed tan(alpha) g to move the block at all.
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import saltus
@@ -27,7 +28,7 @@ print(f"the block of {2 * body.half_height:.0f} m falls from {scales[fallen].min
 
 worst = float(scales[fallen].min())
 motion = saltus.simulate(block.with_({path: block.get(path) * worst}), theta=0.0, duration=20 * body.frequency)
-saltus.plot(motion)
+saltus.plot(motion, ax=plt.gca())
 print(f"at that scale it overturns after {motion.time / body.frequency:.2f} s and {len(motion.impacts)} impacts")
 assert motion.stop == "limit"
 assert worst * np.abs(record.value).max() / 9.81 > np.tan(block.model.alpha)  # below tan(alpha) g it does not move at all

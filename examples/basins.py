@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import saltus
-from saltus.attractors import basin_entropy, basins_of_attraction, find_attractors, stable_manifold, uncertainty_exponent
+from saltus.attractors import basins_of_attraction, find_attractors, stable_manifold, uncertainty_exponent
 from saltus.plots import draw_basins
 
 system = saltus.System(
@@ -20,22 +20,14 @@ print(found)
 
 grid = np.linspace(-2.0, 2.0, 101)
 picture = basins_of_attraction(system, theta=grid, velocity=grid, found=found)
-for label, share in zip(picture.attractor.values, picture.cells.values, strict=True):
-    slowest = float(picture.time.where(picture.label == label).max())
-    print(f"attractor {label}: {100 * share:.1f} % of the grid, reached within {slowest:.0f} forcing periods")
 exponent = uncertainty_exponent(picture.label)
-print(basin_entropy(picture.label))
 print(f"boundary of dimension {exponent.dimension:.2f} +- {exponent.error:.2f}, as far as this grid shows it")
 
 # The saddle orbits: the states that the flow takes to them, computed by the exact backward flow, are where the basins meet.
 branch = saltus.continue_orbit(found.of(3).orbit, "load.frequency", (2.1, 3.2))
 saddles = [orbit for orbit in branch.at(2.4) if not orbit.stable]
 curves = [stable_manifold(saddle, window=((-2.0, 2.0), (-2.0, 2.0))) for saddle in saddles]
-for curve in curves:
-    print(curve)
-
-figure, ax = plt.subplots()
-draw_basins(picture, [curve.states for curve in curves], ax=ax)
+draw_basins(picture, [curve.states for curve in curves], ax=plt.gca())
 
 labels = picture.label.values
 rows, columns = np.nonzero(labels[:, 1:] != labels[:, :-1])

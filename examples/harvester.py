@@ -22,29 +22,18 @@ def harvested(motion):
     return saltus.energies(motion).power.sel(part="damping")
 
 
-def lost(motion):
-    """The mean power that the stops take."""
-    return saltus.energies(motion).power.where(lambda power: power.part.str.startswith("impact")).sum()
-
-
-sweep = saltus.frequency_sweep(system, np.linspace(0.9, 1.5, 21), x=0.0, functions={"harvested": harvested, "lost": lost})
-
-figure, ax = plt.subplots(layout="constrained")
+sweep = saltus.frequency_sweep(system, np.linspace(0.9, 1.5, 21), x=0.0, functions={"harvested": harvested})
 for way, colour in (("up", "#1f6f8b"), ("down", "#c8553d")):
-    line = sweep.sel(direction=way)
-    ax.plot(line.value, line.harvested, color=colour, label=f"dashpot, {way}")
-    ax.plot(line.value, line.lost, ":", color=colour, label=f"stops, {way}")
-ax.set(xlabel=r"frequency $\Omega$", ylabel="mean power", ylim=(0, None))
-ax.legend()
+    plt.plot(sweep.value, sweep.harvested.sel(direction=way), color=colour, label=way)
+plt.gca().set(xlabel=r"frequency $\Omega$", ylabel="mean power of the dashpot", ylim=(0, None))
+plt.legend()
 
 # Where nothing is hit the power is that of the linear oscillator, c (W X)^2 / 2 with X = A W^2 / |1 - W^2 + i c W|.
 W = sweep.value.values
-free = (sweep.lost == 0).sel(direction="down").values
 X = 0.052 * W**2 / np.abs(1 - W**2 + 0.05j * W)
-error = np.abs(sweep.harvested.sel(direction="down").values / (0.05 * (W * X) ** 2 / 2) - 1)[free].max()
+error = np.abs(sweep.harvested.sel(direction="down").values / (0.05 * (W * X) ** 2 / 2) - 1)[X < 1].max()
 gain = float((sweep.harvested.sel(direction="up") / sweep.harvested.sel(direction="down")).max())
-print(f"{free.sum()} of {W.size} values without impacts: the power is that of the formula to {error:.1e}")
+print(f"{np.sum(X < 1)} of {W.size} values on the way down have no impacts: the power is that of the formula to {error:.1e}")
 print(f"with hysteresis the sweep up harvests up to {gain:.1f} times as much")
-assert free.sum() > 10
 assert error < 1e-6
 assert gain > 2

@@ -15,19 +15,15 @@ cell = saltus.System(
     load=saltus.Load(frequency=1.0, horizontal=saltus.Harmonic(amplitude=0.5), vertical=-0.5),
     impact=saltus.VelocityReduction(0.9),
 )
-UNIT = 0.25  # s, the unit of time of this cell (see PhysicalCell)
-times = np.linspace(0.0, 3.0, 300) / UNIT
+times = np.linspace(0.0, 3.0, 300) / 0.25  # 3 s by the unit of time of this cell (see PhysicalCell)
 rng = np.random.default_rng(1)
 clean = saltus.simulate(cell, theta=0.3, duration=times[-1]).at(times)[0]
 record = saltus.Measurement(start={"theta": 0.3}, time=times, values={"theta": clean + rng.normal(0.0, 0.02, 300)}, sigma=0.02)
 
-# The first guess is far off: with it the motion has another number of impacts.
-guess = cell.with_({"model.damping": 0.3, "impact.e": 0.7, "model.beta0": 1.2})
+guess = cell.with_({"model.damping": 0.3, "impact.e": 0.7, "model.beta0": 1.2})  # with it there are fewer impacts
 found = saltus.fit(guess, record, {"model.damping": (0.0, 0.5), "impact.e": (0.6, 1.0), "model.beta0": (1.1, 1.56)})
 print(found)
-print(found.correlation.round(3))
-
-# Metropolis' random walk on the likelihood (flat priors within the bounds), with steps as the errors say.
+# A random walk on the likelihood (flat priors within the bounds), with steps as the errors say.
 names, x = list(found.values), np.array(list(found.values.values()))
 root, (size, _), walk = np.linalg.cholesky(found.covariance), found.log_likelihood(x), []
 for _ in range(1500):
@@ -36,16 +32,9 @@ for _ in range(1500):
     if np.log(rng.uniform()) < larger - size:
         x, size = there, larger
     walk.append(x)
-walk = np.array(walk)
-
-figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
-saltus.plot(found, ax=left)
-right.plot(walk[:, 0], walk[:, 1], ".", markersize=2, alpha=0.4)
-right.set(xlabel="damping $C$", ylabel="restitution $e$", title="random walk on the likelihood")
-
-truth = np.array([0.1, 0.9, np.deg2rad(80)])
+saltus.plot(found, ax=plt.gca())
 errors = np.array(list(found.errors.values()))
-deviations = (np.array(list(found.values.values())) - truth) / errors
-print("off by", deviations.round(2), "standard errors;", "walk / fit errors:", (walk.std(axis=0) / errors).round(2))
+deviations = (np.array(list(found.values.values())) - [0.1, 0.9, np.deg2rad(80)]) / errors
+print("off by", deviations.round(2), "standard errors;", "walk / fit errors:", (np.std(walk, axis=0) / errors).round(2))
 assert np.abs(deviations).max() < 3
-assert np.abs(walk.std(axis=0) / errors - 1).max() < 0.35
+assert np.abs(np.std(walk, axis=0) / errors - 1).max() < 0.35

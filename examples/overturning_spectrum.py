@@ -7,6 +7,7 @@ after an impact, and between the two it may stand. The borders are the motions t
 followed exactly. Below, the share of a sample of records that overturns it, with its interval.
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import saltus
@@ -15,8 +16,7 @@ block = saltus.PhysicalBlock(half_width=0.4, half_height=1.6)
 pulse = saltus.OneSine(amplitude=5.0, frequency=6.0, quantity="acceleration")  # m/s^2, rad/s
 system = block.system(saltus.Load(ground_horizontal=pulse))
 spectrum = saltus.overturning_spectrum(system, amplitude=np.linspace(0.2, 2.4, 23), frequency=np.linspace(1.0, 4.0, 16))
-ax = saltus.plot(spectrum)
-ax.set(xlabel=r"frequency $\omega / p$", ylabel="acceleration over g")
+saltus.plot(spectrum, ax=plt.gca()).set(xlabel=r"frequency $\omega / p$", ylabel="acceleration over g")
 
 # The motion on the border without an impact ends on the unstable equilibrium, theta = -alpha: half a part in a million beside it,
 # the one motion overturns and the other one does not.
@@ -41,5 +41,6 @@ for seed in range(24):
     records.append(saltus.Record(time, noise / np.abs(noise).max(), quantity="acceleration"))
 shaken = [block.system(saltus.Load(ground_horizontal=record)) for record in records]
 share = saltus.fragility(shaken, np.linspace(1.0, 12.0, 23))  # peak accelerations in m/s^2
-saltus.plot(share).set(xlabel="peak acceleration of the record (m/s$^2$)")
+plt.figure()
+saltus.plot(share, ax=plt.gca()).set(xlabel="peak acceleration of the record (m/s$^2$)")
 assert float(share.share[0]) == 0.0 < float(share.lower[-1])

@@ -8,6 +8,7 @@ spectrum as a picture and as a table for a spreadsheet. Impacts begin where the 
 
 from dataclasses import dataclass
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import saltus
@@ -32,8 +33,8 @@ class PreloadedStop(saltus.OneContactModel):
 
 load = saltus.Load(frequency=1.0, force=saltus.Harmonic(amplitude=0.3))
 spectrum = saltus.response_spectrum(saltus.System(model=PreloadedStop(), load=load), bounds=(0.7, 1.6), values=[0.8, 1.0, 1.3])
-saltus.plot(spectrum)
-spectrum["points"].to_dataset()[["branch", "parameter", "amplitude", "stable"]].to_dataframe().to_csv("spectrum.csv")
+saltus.plot(spectrum, ax=plt.gca())
+saltus.to_csv("spectrum.csv", spectrum)
 first = spectrum["special"].special_parameter.values[spectrum["special"].kind.values == "GR"].min()
 grazing = np.sqrt(min(np.roots([1.0, 0.1**2 - 2, 1 - 0.3**2]).real))  # amplitude 1: (1 - u)^2 + c^2 u = F^2, u = Omega^2
 print(f"impacts begin at Omega = {first:.9f}, the linear motion reaches the stop at {grazing:.9f}")

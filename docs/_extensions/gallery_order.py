@@ -4,33 +4,15 @@ import matplotlib.pyplot as plt
 
 from saltus.plots.conventions import RC
 
+TASKS = (  # what people do after their first motion, named in the gallery's first paragraph
+    *("preloaded_stop", "at2_record", "overturning_spectrum", "harvester", "identification", "basins"),
+    *("design_grid", "animation", "notebook", "mass_chain"),
+)
 ORDER = (
-    *(
-        "quickstart",
-        "potential_wells",
-        "coming_to_rest",
-        "rocking_block",
-        "housner",
-        "overturning",
-        "bilinear",
-        "duffing",
-        "two_stops",
-        "belt",
-    ),
-    *(
-        "wall_orbits",
-        "up_and_down",
-        "grazing",
-        "orbits",
-        "period_doubling",
-        "resting_orbit",
-        "response_spectrum",
-        "chaos",
-        "basins",
-        "capture",
-    ),
-    *("ensemble", "stability_chart", "sensitivities", "smoothing", "two_layers", "cell_chain", "impact_pair", "record"),
-    *("physical_units", "preloaded_stop", "at2_record", "overturning_spectrum", "harvester", "mass_chain", "animation"),
+    *("quickstart", *TASKS, "potential_wells", "coming_to_rest", "rocking_block", "housner", "overturning", "bilinear"),
+    *("duffing", "two_stops", "belt", "wall_orbits", "up_and_down", "grazing", "orbits", "period_doubling"),
+    *("resting_orbit", "response_spectrum", "chaos", "capture", "erosion", "ensemble", "stability_chart", "sensitivities"),
+    *("smoothing", "two_layers", "cell_chain", "impact_pair", "record", "physical_units"),
 )
 
 

@@ -204,6 +204,8 @@ def to_csv(path: str | Path, result: Any, table: str | None = None) -> Path:
     """
     from saltus.files import write_text
 
+    if not isinstance(path, (str, Path)):
+        raise ParameterError(f"the path comes first, to_csv(path, result); got {shown(path)}", "path")
     return write_text(path, to_pandas(result, table).to_csv(lineterminator="\n"))
 
 
