@@ -77,8 +77,7 @@ def systems(rng):
 
 
 def defect(rng):
-    """The largest defect of the energy of one random motion of each kind, relative to the energies exchanged, or to 1e-4:
-    where impacts accumulate, those too slow to be followed take 1e-14 together."""
+    """The largest defect of the energy of one random motion of each kind, relative to the energies exchanged, or to 1e-9."""
     worst, impacts = 0.0, 0
     for system, start in systems(rng):
         motion = saltus.simulate(system, **start, periods=2.0)
@@ -86,19 +85,20 @@ def defect(rng):
             continue  # an overturned block
         balance = energies(motion, periods=1)
         impacts += sum(part.startswith("impact") for part in balance.part.values.tolist())
-        worst = max(worst, abs(balance.defect) / max(float(np.abs(balance.energy).sum()), 1e-4))
+        worst = max(worst, abs(balance.defect) / max(float(np.abs(balance.energy).sum()), 1e-9))
     return worst, impacts
 
 
 def test_the_energies_of_random_motions_of_every_kind_add_up():
-    found = [defect(np.random.default_rng(seed)) for seed in range(12)]
+    accumulations = (1202, 1239)  # long ones, and a block that comes to rest in the last period
+    found = [defect(np.random.default_rng(seed)) for seed in (*range(10), *accumulations)]
     assert sum(impacts for _, impacts in found) > 20
     assert max(worst for worst, _ in found) < 1e-10
 
 
 @pytest.mark.thorough
 def test_the_energies_of_ten_thousand_random_motions_add_up():
-    assert max(defect(np.random.default_rng(1000 + seed))[0] for seed in range(-(-CASES // 8))) < 1e-9
+    assert max(defect(np.random.default_rng(1000 + seed))[0] for seed in range(-(-CASES // 8))) < 1e-10
 
 
 def test_a_bouncing_ball_loses_at_the_wall_what_gravity_gives():

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.flow import modes_of
+from saltus.flow import EventKind, modes_of
 from saltus.orbits.averages_over_time import Followed, SampledPart, course_of
 from saltus.public_functions import answered
 from saltus.result import result_dataset
@@ -164,8 +164,9 @@ def _impact_parts(course: SampledPart) -> Parts:
 
 
 def _impact_losses(course: SampledPart) -> Iterator[tuple[str, float]]:
-    """The name of each impact's part, and the kinetic energy that it takes."""
-    system, impacts = course.system, course.motion.impacts
+    """The name of each impact's part, and the kinetic energy that it takes; what impacts accumulate to, which are too slow to be
+    followed, is taken by the last one that is, or where a contact is held from then on."""
+    system, impacts = course.system, course.motion.events.impacts(EventKind.HELD)
     late = (impacts.time > course.begin) & (impacts.time <= course.end)
     if not late.any():
         return
@@ -178,6 +179,7 @@ def _impact_losses(course: SampledPart) -> Iterator[tuple[str, float]]:
         names = ["impact." + "+".join(c for i, c in enumerate(called) if int(bits) >> i & 1) for bits in side]
     else:
         places = np.full((1, times.size), float(system.model.contact))
+        after[:, course.motion._states(0.5 * (times + np.append(times[1:], course.end)))[2] == 0] = 0.0  # rest begins there
         reset, given = system.one_contact.reset, zip(times, before[0], side, strict=True)
         beyond = np.array([reset(t, v, s, system.load, system.impact)[0] for t, v, s in given], dtype=float)
     first, second = (_mass(course, times, places, s) for s in (side, beyond))

@@ -148,7 +148,10 @@ class MotionEvents(RowTable, Sequence[Event]):
 
     def of(self, kind: EventKind) -> Self:
         """The events of one kind."""
-        return self._only(self._labels[:, 1] == EVENT_KINDS.index(kind))
+        return self._of_kinds(kind)
+
+    def _of_kinds(self, *kinds: EventKind) -> Self:
+        return self._only(np.isin(self._labels[:, 1], [EVENT_KINDS.index(kind) for kind in kinds]))
 
     @property
     def codes(self) -> np.ndarray:
@@ -161,9 +164,9 @@ class MotionEvents(RowTable, Sequence[Event]):
         margin."""
         return self._labels[:, 3]
 
-    def impacts(self) -> Impacts:
-        """The impacts, as arrays."""
-        impacts = self.of(EventKind.IMPACT)
+    def impacts(self, *also: EventKind) -> Impacts:
+        """The impacts, and the events of other kinds if wanted, as arrays."""
+        impacts = self._of_kinds(EventKind.IMPACT, *also)
         labels, values = impacts._labels, impacts._values
         return Impacts(impacts.times, labels[:, 2].astype(np.int8), values[:, 1], values[:, 2])
 
@@ -204,9 +207,9 @@ class ContactEvents(MotionEvents):
         chosen = [name for i, name in enumerate((*self._contacts, *self._frictions)) if bits >> i & 1]
         return "both" if chosen == list(self._contacts) and len(chosen) == 2 else "+".join(chosen)
 
-    def impacts(self) -> Impacts:
+    def impacts(self, *also: EventKind) -> Impacts:
         """The impacts, as arrays; `side` has the bits of the contacts that were hit, velocities are (n, coordinates)."""
-        impacts = self.of(EventKind.IMPACT)
+        impacts = self._of_kinds(EventKind.IMPACT, *also)
         before, after, _ = impacts._parts(slice(None))
         return Impacts(impacts.times, impacts._labels[:, 2].astype(np.int16), before, after)
 
