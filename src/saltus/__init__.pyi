@@ -107,6 +107,8 @@ from .systems import VelocityReduction as VelocityReduction
 from .systems import WallOscillator as WallOscillator
 from .systems import energy_gain as energy_gain
 from .systems import register as register
+from .web.study_page import Explorer as Explorer
+from .web.study_page import explore as explore
 from .web.study_page import page as page
 
 __version__: str

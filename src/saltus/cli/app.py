@@ -195,6 +195,27 @@ def page(
 
 
 @app.command()
+def explore(
+    study: Study,
+    results: Annotated[
+        list[Path] | None, typer.Option("--with", metavar="STORE", help="A result of the study to lay over the page; repeatable.")
+    ] = None,
+) -> None:
+    """Make the page of a study that computes, and open it in the browser.
+
+    It is the page that `saltus page` makes, in results/<name of the study>.
+    Drag a slider, click into the phase plane or on a branch, and the exact
+    motion follows. A model of your own is Python code, and is run.
+
+    Example: [cyan]saltus explore study.toml --with results/study/basins.nc[/]
+    """
+    with guarded():
+        from saltus.cli.page_command import write_page
+
+        write_page(study, results or [], None, show=True)
+
+
+@app.command()
 def plot(
     store: Annotated[Path, typer.Argument(metavar="STORE", help="A .nc file or .zarr folder that saltus has written.")],
     output: Annotated[

@@ -219,13 +219,28 @@ class Continuation:
 
 
 def both_ways(
-    first: Any, events: Callable[[], Events], bounds: Bounds, steps: StepSettings = STEPS, progress: Progress = silent
+    first: Any,
+    events: Callable[[], Events],
+    bounds: Bounds,
+    steps: StepSettings = STEPS,
+    progress: Progress = silent,
+    growing: Callable[[tuple[Any, ...]], object] | None = None,
 ) -> Course[Any, Any]:
-    """The curve through a point, followed against its tangent and then along it, or once if it closes."""
+    """The curve through a point, followed against its tangent and then along it, or once if it closes.
+
+    `growing` is called with all points so far, in order, whenever there is a new one.
+    """
     watch: Watch = Watch(progress, bounds, steps.most_points)
-    halves = []
+    halves: list[Course[Any, Any]] = []
+
+    def watched(point: Any) -> None:
+        watch(point)
+        if growing is not None:
+            back, ahead = (halves[0].points, run.points) if halves else (run.points, [first])
+            growing((*(point.turned() for point in reversed(back[1:])), *ahead))
+
     for point in (first.turned(), first):
-        run: Continuation = Continuation(bounds, events(), steps, watch)
+        run: Continuation = Continuation(bounds, events(), steps, watched)
         run.follow(point)
         halves.append(run.course(End(CurveEnd.CLOSED)))
         if run.end == End(CurveEnd.CLOSED):

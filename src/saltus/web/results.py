@@ -42,7 +42,23 @@ def results_as_json(results: Iterable[Any], system: System) -> list[dict[str, An
     ParameterError
         A result of another system, of other equations or of another version of saltus, or of a kind that a page does not show.
     """
-    return [_one(result.to_xarray() if hasattr(result, "to_xarray") else result, system) for result in results]
+    entries = [_one(result.to_xarray() if hasattr(result, "to_xarray") else result, system) for result in results]
+    return list(_joined(entries))
+
+
+def _joined(entries: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """Results of which branches along one parameter, with the same other numbers, are one diagram."""
+    diagrams: dict[str, dict[str, Any]] = {}
+    for entry in entries:
+        others = {path: value for path, value in entry["values"].items() if path != entry.get("path")}
+        key = json.dumps([entry["title"], entry.get("path"), others]) if "dots" not in entry else ""
+        if entry["kind"] == "diagram" and key in diagrams:
+            for name in ("branches", "special"):
+                diagrams[key][name] += entry[name]
+            continue
+        if entry["kind"] == "diagram" and key:
+            diagrams[key] = entry
+        yield entry
 
 
 def _one(data: Any, system: System) -> dict[str, Any]:
@@ -51,14 +67,14 @@ def _one(data: Any, system: System) -> dict[str, Any]:
         raise ParameterError(f"a page shows {', '.join(sorted(READERS))}, not a result of the kind {kind!r}", "results")
     own = _system_of(data.attrs)
     check_provenance(data.attrs, own, f"the {kind.replace('_', ' ')}")
-    if not _differ_in_numbers(own, system):
+    if not differ_in_numbers(own, system):
         raise ParameterError(f"the {kind.replace('_', ' ')} is of another system: its loads or impact law differ", "results")
     title = kind.replace("_", " ").capitalize()
     common = {"title": str(data.attrs.get("title", title)), "digest": digest(system), "values": dict(numbers(own))}
     return common | READERS[kind](data)
 
 
-def _differ_in_numbers(one: System, other: System) -> bool:
+def differ_in_numbers(one: System, other: System) -> bool:
     """Whether two systems are the same but for their numbers."""
     try:
         return one.with_(dict(numbers(other))) == other

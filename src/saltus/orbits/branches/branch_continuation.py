@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -42,6 +43,7 @@ def continue_orbit(
     step: float = STEP,
     while_stable: bool = False,
     progress: Progress = silent,
+    growing: Callable[[Branch], object] | None = None,
 ) -> Branch:
     """The branch of an orbit along a parameter, both ways, until it closes, reaches a bound, shrinks to rest or cannot go on.
 
@@ -62,6 +64,8 @@ def continue_orbit(
         Whether to end just beyond the loss of stability; orbits that rest for a part of their period never lose it.
     progress
         Called with the share of the range that has been seen and the value of the parameter.
+    growing
+        Called with the branch so far, which has no special points yet, at each new orbit, and with the whole branch at the end.
 
     Raises
     ------
@@ -81,8 +85,19 @@ def continue_orbit(
     low, high = _checked(orbit, path, bounds)
     first, steps = start(*along(orbit, path), scale=(high - low) / 3.0), replace(STEPS, longest=step)
     events = partial(BranchEvents, while_stable=while_stable)
-    course = both_ways(first, lambda: events(functions or {}), {path: (low, high)}, steps, progress)
-    return Branch(**vars(course), path=path)
+    show, unfinished = growing or _unseen, End(OrbitEnd.GROWING)
+
+    def grown(points: tuple[OrbitPoint, ...]) -> None:
+        show(Branch(points, (), (unfinished, unfinished), (), path))
+
+    course = both_ways(first, lambda: events(functions or {}), {path: (low, high)}, steps, progress, growing and grown)
+    branch = Branch(**vars(course), path=path)
+    show(branch)
+    return branch
+
+
+def _unseen(branch: Branch) -> None:
+    """What a branch is given to that nobody watches."""
 
 
 def follow_stable(orbit: PeriodicOrbit, path: str, target: float) -> Branch:

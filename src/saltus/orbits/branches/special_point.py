@@ -70,6 +70,7 @@ class OrbitEnd(EndReason):
     """
 
     START = "start"
+    GROWING = "is still followed"
     BORN = "{kind} at {parameter:.9g}"
     FIRST = "the first {kind}"
     UNSTABLE = "is no longer stable"

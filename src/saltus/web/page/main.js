@@ -17,6 +17,7 @@ import { basinsLegend, basinsView, sweepControls, sweepSaid, sweepView } from ".
 import { Choice, differingSaid, ofThisSystem, orbitSaid, paintBeneath, resultView } from "./results_view.js";
 import { currentPalette } from "./palette.js";
 import { entriesOf, firstState, isPeriodic, spaced, startEntries, tamed } from "./description.js";
+import { Embedding } from "./embedding.js";
 
 /** @typedef {import("./types.js").Description} Description */
 /** @typedef {import("./types.js").Engine} Engine */
@@ -46,8 +47,9 @@ export class Page {
     /** @type {import("./controls.js").NumberField[]} */
     this.fields = [];
     this.address = new Address(this.store, this.first, description, (found) => this.linked(found));
-    const { own, refused } = ofThisSystem(description.results ?? [], description.digest);
-    this.results = own;
+    this.results = description.results ?? [];
+    /** Which of the results is shown, or -1. */
+    this.shownResult = -1;
     this.session.compute();
     if (this.session.refusal && "state" in linked) this.store.state = this.first;
     this.session.compute();
@@ -60,10 +62,11 @@ export class Page {
     this.makeControls();
     this.makeViews();
     this.makeLaboratory();
-    this.makeResults(refused);
+    this.makeResults();
     this.follow();
     this.notice("refusal" in linked ? linked.refusal : "");
     this.drawAll();
+    if (description.embedded) new Embedding(this, window.parent);
   }
 
   makeHead() {
@@ -73,8 +76,8 @@ export class Page {
     at("title").textContent = document.title;
     at("subtitle").textContent = own ? spaced(description.model.name) : "";
     const theme = /** @type {HTMLSelectElement} */ (at("theme"));
-    theme.value = store.state.theme;
     theme.addEventListener("change", () => store.set({ theme: /** @type {any} */ (theme.value) }));
+    at("copy-link").hidden = Boolean(description.embedded); // a page in a notebook has no address
     at("copy-link").addEventListener("click", async () => this.notice(await this.address.copy()));
     at("save-toml").addEventListener("click", () => save("study.toml", asToml(description, store.state)));
     at("save-python").addEventListener("click", () => save("study.py", asPython(description, store.state)));
@@ -241,30 +244,44 @@ export class Page {
     });
   }
 
-  /** @param {string[]} refused */
-  makeResults(refused) {
+  makeResults() {
     const { store } = this;
-    this.shownResult = store.state.selected?.result ?? this.results.findIndex(({ kind }) => kind === "diagram" || kind === "chart");
-    this.choice = new Choice(this.session, (numbers, start, periods) => this.showMotion(numbers, start, periods), () => this.shownResult ?? 0);
-    at("results").hidden = !(anyShown(this.results) || refused.length);
-    at("results-refused").textContent = refused.join(" ");
+    this.shownResult = store.state.selected?.result ?? -1;
+    this.choice = new Choice(this.session, (numbers, start, periods) => this.showMotion(numbers, start, periods), () => this.shownResult);
     const choice = /** @type {HTMLSelectElement} */ (at("result-choice"));
-    this.results.forEach(({ title, kind }, i) => (kind === "diagram" || kind === "chart") && choice.add(new Option(title, String(i))));
-    choice.hidden = choice.options.length < 2;
-    choice.value = String(this.shownResult);
     choice.addEventListener("change", () => {
       this.shownResult = Number(choice.value);
       store.set({ selected: null, windows: { ...store.state.windows, result: null } });
       this.drawAll();
     });
-    this.addPlot(resultView(this.session, () => this.results[this.shownResult ?? -1] ?? null, this.choice));
+    this.addPlot(resultView(this.session, () => this.results[this.shownResult] ?? null, this.choice));
+    this.laidOver(this.results);
+  }
+
+  /** Lay results over the page in the place of those that it has; the one that is shown stays, if it is still there. @param {import("./types.js").ResultEntry[]} results */
+  laidOver(results) {
+    const { own, refused } = ofThisSystem(results, this.description.digest);
+    const { selected } = this.store.state;
+    if (selected && orbitOf(own, selected) !== orbitOf(this.results, selected)) this.store.set({ selected: null });
+    const before = this.results[this.shownResult]?.title;
+    this.results = own;
+    const plotted = own.flatMap((result, i) => (isPlotted(result) ? [i] : []));
+    const there = plotted.filter((i) => own[i]?.title === before);
+    this.shownResult = there.includes(this.shownResult) ? this.shownResult : (there[0] ?? plotted[0] ?? -1);
+    at("results").hidden = !(plotted.length || refused.length);
+    at("results-refused").textContent = refused.join(" ");
+    const choice = /** @type {HTMLSelectElement} */ (at("result-choice"));
+    choice.replaceChildren(...plotted.map((i) => new Option(own[i]?.title, String(i))));
+    choice.hidden = plotted.length < 2;
+    choice.value = String(this.shownResult);
     this.saySelected();
+    this.frame.before("views", () => this.drawAll());
   }
 
   saySelected() {
     const { selected } = this.store.state;
     const result = selected && this.results[selected.result];
-    const shown = this.results[this.shownResult ?? -1];
+    const shown = this.results[this.shownResult];
     at("differing").textContent = shown ? differingSaid(shown, this.store.state.values) : "";
     at("orbit").textContent = selected && result ? orbitSaid(result, selected.branch, selected.point) : "";
   }
@@ -346,6 +363,7 @@ export class Page {
 
   applyTheme() {
     const { theme } = this.store.state;
+    /** @type {HTMLSelectElement} */ (at("theme")).value = theme;
     if (theme === "system") delete document.documentElement.dataset.theme;
     else document.documentElement.dataset.theme = theme;
     this.frame.before("views", () => this.drawAll());
@@ -383,9 +401,15 @@ export class Page {
   }
 }
 
-/** @param {any[]} results */
-function anyShown(results) {
-  return results.some(({ kind }) => kind === "diagram" || kind === "chart");
+/** An orbit of a result as text, by which it is told from another at its place. @param {import("./types.js").ResultEntry[]} results @param {{result: number, branch: number, point: number}} chosen */
+function orbitOf(results, { result, branch, point }) {
+  const shown = results[result];
+  return shown ? `${shown.title}: ${orbitSaid(shown, branch, point)}` : "";
+}
+
+/** Whether a result has a view of its own; the others lie beneath the phase plane. @param {{kind: string}} result */
+function isPlotted({ kind }) {
+  return kind === "diagram" || kind === "chart";
 }
 
 /** @param {string} id */

@@ -19,6 +19,7 @@
  * @property {{system: any, simulate: Record<string, any>}} study
  * @property {string} digest
  * @property {ResultEntry[]} [results]
+ * @property {boolean} [embedded]  Whether the page is shown in a notebook, which it tells what is changed.
  *
  * @typedef {Record<string, number>} Numbers
  * @typedef {{time: number, kind: string, contact: string|number, before: ArrayLike<number>, after: ArrayLike<number>}} MotionEvent
