@@ -140,13 +140,13 @@ def _parts(course: SampledPart) -> Parts:
 def _friction_parts(course: SampledPart, mass: np.ndarray, force: np.ndarray) -> Parts:
     """What the grounds of frictions supply, where they move, and what the frictions take."""
     system, parts = course.system, Parts()
-    if not isinstance(system.model, ContactModel) or not system.contact_model.frictions:
+    if not isinstance(system.model, ContactModel) or not (frictions := system.contact_model.frictions):
         return parts
     model, load = system.contact_model, system.load
     normals = model.normal_forces(course.time, *_state(course.position, course.velocity), load)
     holding = np.einsum("ijn,jn->in", mass, course.rate(course.velocity)) - force  # what makes a coordinate stick
     slides = modes_of(model, course.side)[1]
-    for friction, normal, slide in zip(model.frictions, normals, slides, strict=True):
+    for friction, normal, slide in zip(frictions, normals, slides, strict=True):
         i, ground = model.coordinates.index(friction.coordinate), friction.ground_speed
         acting = np.where(slide == 0, holding[i], -friction.kinetic * normal * slide)
         if ground:

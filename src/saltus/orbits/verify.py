@@ -8,7 +8,7 @@ import numpy as np
 
 from saltus.checks import check_count
 from saltus.flow import simulate_many
-from saltus.orbits.equations.whole_motion import DYING
+from saltus.orbits.equations.sampled_motion import DYING
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import TOLERANCES
 from saltus.public_functions import answered

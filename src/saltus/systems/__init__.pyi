@@ -75,6 +75,7 @@ from .states import check_reached as check_reached
 from .states import check_window as check_window
 from .states import even_steps as even_steps
 from .states import held_by_contacts as held_by_contacts
+from .states import held_values as held_values
 from .states import initial_states as initial_states
 from .states import is_still as is_still
 from .states import on_this_side as on_this_side

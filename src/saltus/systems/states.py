@@ -295,6 +295,22 @@ def held_by_contacts(system: System, states: np.ndarray) -> np.ndarray:
     return held
 
 
+def held_values(system: System, state: np.ndarray, within: float, closed: int = 0) -> dict[int, float]:
+    """The variables of a state (d,) that are fixed, by their places, with their values: the coordinates and velocities that
+    contacts hold, and the velocities of coordinates that stick, up to rounding; those of the contacts in `closed`, a bit each, in
+    any case.
+    """
+    found, names = dict[int, float](), system.model.coordinates
+    for i, contact in enumerate(system.model.contacts):
+        place, speed = names.index(contact.coordinate), len(names) + names.index(contact.coordinate)
+        if closed >> i & 1 or max(abs(contact.gap(state[place])), abs(state[speed])) < within:
+            found |= {place: float(contact.position), speed: 0.0}
+    for friction in system.model.frictions:
+        place, ground_speed = len(names) + names.index(friction.coordinate), float(friction.ground_speed)
+        found |= {place: ground_speed} if abs(state[place] - ground_speed) < within else {}
+    return found
+
+
 def _held(system: System, states: np.ndarray, window: Window) -> np.ndarray:
     """States (..., n, d) in which some coordinates are held at contacts, alternating as `within_window` says."""
     names, turn = system.model.coordinates, np.arange(states.shape[-2]) // 2

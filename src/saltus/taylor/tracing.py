@@ -206,7 +206,8 @@ def trace(system: System, stop_at: tuple[str, ...] = (), sensitivities: tuple[st
         The model does not have a margin, or a path leads to no number.
     """
     paths = None if sensitivities is None else check_paths(system, sensitivities)
-    result = Trace(model=type(system.model).__name__, side_count=len(system.model.sides), dof=len(system.model.coordinates))
+    sides = system.model.sides
+    result = Trace(model=type(system.model).__name__, side_count=len(sides), dof=len(system.model.coordinates))
     twin = substitute_numbers(system, result.symbol)
     _name_records(twin.load)
     object.__setattr__(twin, "load", DeclaredLoad(twin.load, twin.model))
@@ -214,7 +215,7 @@ def trace(system: System, stop_at: tuple[str, ...] = (), sensitivities: tuple[st
     dof = len(model.coordinates)
     coordinates = tuple(Expr("coordinate", (), i) for i in range(dof))
     velocities = tuple(Expr("velocity", (), i) for i in range(dof))
-    side = Expr("side") if model.sides else number(1.0)
+    side = Expr("side") if sides else number(1.0)
     q, v = (coordinates[0], velocities[0]) if dof == 1 else (coordinates, velocities)
     several = model.holds_coordinates
     accelerations = _trace_contacts(result, twin, t, q, v) if several else ask(model, "acceleration", t, q, v, side, load)
@@ -222,7 +223,7 @@ def trace(system: System, stop_at: tuple[str, ...] = (), sensitivities: tuple[st
         raise TraceError(f"{type(system.model).__name__}.acceleration must return {dof} values, got {accelerations!r}")
     one_by_one = accelerations if several or dof > 1 else (accelerations,)
     result.acceleration = [combine("add", a, 0.0) for a in one_by_one]
-    if model.sides:
+    if sides:
         _trace_contact(result, twin, t, coordinates, velocities, side)
     _trace_margins(result, twin, t, q, v, side, stop_at)
     _check(result)
@@ -271,7 +272,7 @@ def _trace_contact(result: Trace, twin: Any, t: LoadTime, q: tuple[Expr, ...], v
     result.contact_damping = -substitute(differentiate(result.acceleration[0], v[0]), at_contact)
     next_side, after = ask(model, "reset", t, v[0], side, load, twin.impact)
     result.next_side, result.velocity_after = combine("add", next_side, 0.0), combine("add", after, 0.0)
-    _check_next_side(result.next_side, model.sides, type(model).__name__)
+    _check_next_side(result.next_side, twin.one_contact.sides, type(model).__name__)
 
 
 def _check_gap(gap: Expr, coordinate: Expr, model: str) -> None:
@@ -312,11 +313,12 @@ def _known_number(expression: Expr) -> float | Fraction | None:
 
 def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> list[Any]:
     """Trace the accelerations of a model with several contacts, for any choice of closed ones."""
-    model, load, count = twin.model, twin.load, len(twin.model.coordinates)
+    model, load, count = twin.contact_model, twin.load, len(twin.model.coordinates)
+    contacts, frictions = twin.contact_model.contacts, twin.contact_model.frictions
     free = [Expr("free", (), i) for i in range(count)]
-    slides = [Expr("slide", (), k) for k in range(len(model.frictions))]
+    slides = [Expr("slide", (), k) for k in range(len(frictions))]
     mass, _ = mass_and_force(model, t, q, v, load)
-    if model.frictions and not apart(model, mass):
+    if frictions and not apart(model, mass):
         raise TraceError(
             f"the mass matrix of {type(model).__name__} connects a coordinate with a contact to one with a friction: impacts "
             "would act on what sticks, which is not followed; choose coordinates in which it does not"
@@ -324,13 +326,13 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
     accelerations = [Expr("acceleration", (), i) for i in range(count)]
     holding = [*reactions(model, t, q, v, accelerations, load), *stick_margins(model, t, q, v, accelerations, load)]
     result.reactions = [combine("add", r, 0.0) for r in holding]
-    result.ground_speeds = [combine("add", friction.ground_speed, 0.0) for friction in model.frictions]
-    result.friction_coordinates = tuple(model.coordinates.index(friction.coordinate) for friction in model.frictions)
+    result.ground_speeds = [combine("add", friction.ground_speed, 0.0) for friction in frictions]
+    result.friction_coordinates = tuple(model.coordinates.index(friction.coordinate) for friction in frictions)
     result.mass = [combine("add", entry, 0.0) for row in mass for entry in row]
     result.restitution = [combine("add", entry, 0.0) for row in twin.impact.restitution_matrix(model) for entry in row]
-    result.positions = [combine("add", contact.position, 0.0) for contact in model.contacts]
-    result.signs = tuple(contact.sign for contact in model.contacts)
-    result.contact_coordinates = tuple(model.coordinates.index(contact.coordinate) for contact in model.contacts)
+    result.positions = [combine("add", contact.position, 0.0) for contact in contacts]
+    result.signs = tuple(contact.sign for contact in contacts)
+    result.contact_coordinates = tuple(model.coordinates.index(contact.coordinate) for contact in contacts)
     return constrained_acceleration(model, t, q, v, load, free, slides)
 
 

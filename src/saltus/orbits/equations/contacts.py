@@ -34,7 +34,7 @@ from saltus.orbits.branches.symmetry import full_point
 from saltus.orbits.equations.contract import MotionToRead, OrbitEquations, OrbitEvaluation, Solution
 from saltus.orbits.equations.event_sequence import STAYS, read_signature
 from saltus.orbits.signature import TOLERANCES, ModeChange, Signature
-from saltus.systems import System, arguments_of, image_of
+from saltus.systems import System, arguments_of, held_values, image_of
 from saltus.taylor import FREQUENCY
 
 AFTER_IMPACT = 2  # power of the time with which the gap grows after an impact with e = 0; after a release it is `AFTER_RELEASE`
@@ -300,10 +300,8 @@ class ContactsEquations(OrbitEquations):
 
     def _with_held(self, state: np.ndarray, closed: int, values: np.ndarray) -> np.ndarray:
         """A state put exactly onto the contacts that are closed, and onto those that it touches without speed, up to rounding."""
-        for i, contact in enumerate(self.system_at(values).model.contacts):
-            pair = [self._run.trace.contact_coordinates[i], self.own + self._run.trace.contact_coordinates[i]]
-            if closed >> i & 1 or max(abs(contact.gap(state[pair[0]])), abs(state[pair[1]])) < TOLERANCES.touch:
-                state[pair] = float(contact.position), 0.0
+        for place, value in held_values(self.system_at(values), state, TOLERANCES.touch, closed).items():
+            state[place] = value
         return state
 
 

@@ -6,16 +6,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from saltus.errors import MotionError
-from saltus.flow import EventCode, EventKind, Motion, modes_of
-from saltus.orbits.equations.sampled_motion import ONE_INSTANT, SampledMotion
+from saltus.flow import EventCode, EventKind, Motion
+from saltus.orbits.equations.sampled_motion import ONE_INSTANT, Group, SampledMotion, modes_in
 from saltus.orbits.signature import ModeChange, Signature
-from saltus.systems import Model
+from saltus.systems import System
 
 CHANGES = (
     EventCode.IMPACT,
@@ -40,22 +39,14 @@ class EventSettings:
 
 
 SETTINGS = EventSettings()
-RESTING_MODE = 2  # the mode of a single contact at rest; on its sides -1 and +1 the mode is 1 and 3
 
 
 class OrbitEvent(NamedTuple):
-    """An event: its kind as in `EventCode`, the contacts and frictions as bits, and the mode after it (`modes_of`)."""
+    """An event: its kind as in `EventCode`, the contacts and frictions as bits, and the number of the mode after it."""
 
     kind: int
     parts: int
     mode: int
-
-
-class Group(NamedTuple):
-    """Contacts and frictions that act on one another: their bits in an event's `parts`, and in its `mode` less 1."""
-
-    parts: int
-    modes: int
 
 
 @dataclass(frozen=True)
@@ -102,15 +93,15 @@ def sequence_of(motion: Motion, sampled: SampledMotion, images: Sequence[int] | 
     With `images`, the number of the mirror image of each contact and friction, the motion is half a period of a symmetric orbit:
     the images of its events follow.
     """
-    period = motion.time - motion.start
+    period, modes = motion.time - motion.start, modes_in(motion.system)
     listed, when, all_speeds = _listed(motion)
     events, times = tuple(listed), tuple(when.tolist())
     speeds = [speed for event, speed in zip(events, all_speeds.tolist(), strict=True) if event.kind == EventCode.IMPACT]
     section_distance = _section_distance(motion, period)
     if images is not None:
-        events += tuple(_image(event, motion.system.model, images) for event in events)
+        events += tuple(OrbitEvent(event.kind, *modes.image(event.parts, event.mode, images)) for event in events)
         times, period = times + tuple(time + period for time in times), 2.0 * period
-    apart, groups = [SETTINGS.farthest], _groups(motion)
+    apart, groups = [SETTINGS.farthest], modes.groups(motion.position)
     for group in groups:
         own = [time for event, time in zip(events, times, strict=True) if event.parts & group.parts]
         apart += np.diff([*own, own[0] + period]).tolist() if len(own) > 1 else []
@@ -119,81 +110,24 @@ def sequence_of(motion: Motion, sampled: SampledMotion, images: Sequence[int] | 
     return EventSequence(events, times, period, max(distance, 0.0), section_distance, groups)
 
 
-def _groups(motion: Motion) -> tuple[Group, ...]:
-    """The contacts of each group if the mass matrix couples no coordinates of different groups; else one group of all."""
-    model, count = motion.system.model, len(motion.system.model.contacts)
-    everything = (Group((1 << count + len(model.frictions)) - 1, (1 << count + 2 * len(model.frictions)) - 1),)
-    if not model.holds_coordinates:
-        return (Group(1, 3),)
-    names = dict.fromkeys(contact.group for contact in model.contacts)
-    if len(names) < 2 or model.frictions:
-        return everything
-    mass, found = np.asarray(motion.system.contact_model.mass_matrix(motion.position), dtype=float), list[Group]()
-    places = [
-        [model.coordinates.index(contact.coordinate) for contact in model.contacts if contact.group == name] for name in names
-    ]
-    if any(mass[np.ix_(own, other)].any() for own, other in combinations(places, 2)):
-        return everything
-    for name in names:
-        bits = sum(1 << i for i, contact in enumerate(model.contacts) if contact.group == name)
-        found.append(Group(bits, bits))
-    return tuple(found)
-
-
-def _image(event: OrbitEvent, model: Model, images: Sequence[int]) -> OrbitEvent:
-    """The mirror image of an event."""
-    if not model.holds_coordinates:
-        return event._replace(mode=2 * RESTING_MODE - event.mode)
-    closed, slides = modes_of(model, np.array(event.mode))
-    count, mode = len(model.contacts), 1
-    for i, image in enumerate(images):
-        if i < count:
-            mode += (int(closed) >> i & 1) << image
-        else:
-            mode += (1 - int(slides[i - count])) << (count + 2 * (image - count))
-    return OrbitEvent(event.kind, sum(1 << image for i, image in enumerate(images) if event.parts >> i & 1), mode)
-
-
 def _listed(motion: Motion) -> tuple[list[OrbitEvent], np.ndarray, np.ndarray]:
     """The events that change the mode, without the impacts of accumulations; their times; and how fast each closes a contact."""
-    found, dense = motion.events, motion.dense
-    times, codes, speeds = found.times, _codes(motion), np.full(len(found), math.inf)
-    speeds[codes[:, 0] == EventCode.IMPACT] = impact_speeds(motion)
+    found, dense, reading = motion.events, motion.dense, modes_in(motion.system)
+    times, codes, speeds = found.times, reading.codes(motion), np.full(len(found), math.inf)
+    speeds[codes[:, 0] == EventCode.IMPACT] = reading.impact_speeds(motion)
     # a rest is recorded besides the event that brings it, and at the start of a motion: it counts only if it stands alone
     alone = (np.searchsorted(times, times, side="right") - np.searchsorted(times, times) == 1) & (times > motion.start)
     chosen = np.isin(codes[:, 0], CHANGES) & (alone | (codes[:, 0] != EventCode.REST))
     kept = np.flatnonzero(chosen)
-    for parts, _ in _groups(motion):
+    for parts, _ in reading.groups(motion.position):
         own = kept[codes[kept, 1] & parts != 0]
         chosen[own[_dying(np.column_stack([codes[own, 0], codes[own, 1] & parts]), speeds[own])]] = False
     times, codes = times[chosen], codes[chosen]
     if dense is None or not times.size:
         return [], times, speeds[chosen]
-    modes = dense.side[np.searchsorted(dense.start, times, side="right") - 1]
-    modes = modes if motion.system.model.holds_coordinates else modes + RESTING_MODE
+    modes = reading.numbers(dense.side[np.searchsorted(dense.start, times, side="right") - 1])
     events = [OrbitEvent(*numbers) for numbers in np.column_stack([codes, modes]).tolist()]
     return events, times, speeds[chosen]
-
-
-def _codes(motion: Motion) -> np.ndarray:
-    """The kinds of a motion's events, and the contacts and frictions that act as bits, (n, 2). A single contact is the first bit,
-    and its rest is that of one that is held."""
-    codes = motion.events.codes
-    if motion.system.model.holds_coordinates:
-        return codes
-    return np.column_stack([np.where(codes[:, 0] == EventCode.REST, EventCode.HELD, codes[:, 0]), np.ones(len(codes), int)])
-
-
-def impact_speeds(motion: Motion) -> np.ndarray:
-    """The least speed at which each impact closes one of its contacts, (n,)."""
-    impacts, names = motion.impacts, motion.system.model.coordinates
-    if not motion.system.model.holds_coordinates:
-        return np.asarray(np.abs(impacts.velocity_before))
-    speeds = np.full(len(impacts), math.inf)
-    for i, contact in enumerate(motion.system.model.contacts):
-        rates = np.abs(impacts.velocity_before[:, names.index(contact.coordinate)])
-        speeds = np.where(impacts.side >> i & 1 == 1, np.minimum(speeds, rates), speeds)
-    return speeds
 
 
 def _dying(codes: np.ndarray, speeds: np.ndarray) -> np.ndarray:
@@ -255,7 +189,7 @@ def section_of(
     if phase is None:
         bounds = np.unique([motion.start, *(event.time for event in motion.events if motion.start < event.time < end), end])
         spans, middles = np.diff(bounds), 0.5 * (bounds[1:] + bounds[:-1])
-        moves = _moves(motion.system.model, motion.dense.states(middles)[2])
+        moves = _moves(motion.system, motion.dense.states(middles)[2])
         time = float(middles[max(range(len(spans)), key=lambda i: (moves[i], spans[i]))])
     else:
         time = motion.start + (phase / frequency - motion.start) % (2.0 * np.pi / frequency)
@@ -263,13 +197,11 @@ def section_of(
     return time * frequency % (2.0 * np.pi), state
 
 
-def _moves(model: Model, sides: np.ndarray) -> np.ndarray:
+def _moves(system: System, side: np.ndarray) -> np.ndarray:
     """Whether a motion with these numbers `side` is not held altogether, (n,)."""
-    if not model.holds_coordinates:
-        return np.asarray(sides != 0)
-    closed, slides = modes_of(model, sides)
-    held = sum((closed >> i & 1 for i in range(len(model.contacts))), sum(s == 0 for s in slides))
-    return np.asarray(held < len(model.coordinates))
+    modes = modes_in(system)
+    held = np.sum([*modes.closed(side), *(direction == 0 for direction in modes.slides(side))], axis=0)
+    return np.asarray(held < len(system.model.coordinates))
 
 
 def read_signature(motion: Motion, periods: int, frequency: float) -> tuple[Signature, np.ndarray, np.ndarray]:
@@ -318,7 +250,7 @@ def _mode_changes(motion: Motion, together: float) -> list[tuple[float, ModeChan
 
 def _instants(motion: Motion, together: float) -> list[tuple[float, dict[int, bool]]]:
     """The instants at which contacts act: for each of them the contacts, and whether it is an impact (else a release)."""
-    contacts = motion.system.model.contacts
+    contacts = motion.system.contact_model.contacts
     names, instants = [contact.name for contact in contacts], list[tuple[float, dict[int, bool]]]()
     events: Sequence[Any] = motion.events
     for event in events:

@@ -1,15 +1,17 @@
-"""A motion sampled so densely in each of its steps that all extrema can be found."""
+"""What the modes of a motion are, and a motion sampled so densely in each of its steps that all extrema can be found."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from itertools import combinations
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from saltus.flow import Motion, contact_pull, modes_of
-from saltus.systems import reactions, stick_margins
+from saltus.flow import EventCode, Motion, contact_pull, modes_of
+from saltus.systems import System, reactions, stick_margins
 
 SAMPLES = 33  # in each step; minima of parabolas through them have errors of the fourth power of their distance
 NEWTON_STEPS = 4  # from the largest sample of a coordinate to its extremum; each squares the error
@@ -17,12 +19,176 @@ NARROWER = (0.3, 1e-3)  # distances between the instants at which a force is eva
 MOST_ORDER = 24  # the highest order of a step's series
 # Events nearer to each other than this share of the motion's duration happen at one instant, and steps between them are left out.
 ONE_INSTANT = 1e-9
+DYING = 1e-5  # Slower impacts are not listed: they belong to an accumulation.
 
 SHARES = np.linspace(0.0, 1.0, SAMPLES)
 ORDERS = np.arange(MOST_ORDER + 1)
 POWERS = SHARES ** ORDERS[:, None]  # of a series over a step of length 1, then of its derivatives
 SLOPES = ORDERS[:, None] * SHARES ** np.maximum(ORDERS - 1, 0)[:, None]
 BENDS = (ORDERS * (ORDERS - 1))[:, None] * SHARES ** np.maximum(ORDERS - 2, 0)[:, None]
+
+
+class Group(NamedTuple):
+    """Contacts and frictions that act on one another: their bits in an event's `parts`, and in its `mode` less 1."""
+
+    parts: int
+    modes: int
+
+
+class GapAlong(NamedTuple):
+    """The gap sign (q - p) of a contact along a motion."""
+
+    coordinate: int  # the place of q among the coordinates
+    sign: float
+    position: float  # p
+    is_open: np.ndarray  # where it is open
+
+
+class SideModes:
+    """How motions on the sides of one contact, or without contacts, are read: their numbers `side`, their events and gaps."""
+
+    def __init__(self, system: System) -> None:
+        self.system = system
+
+    def numbers(self, side: np.ndarray) -> np.ndarray:
+        """The numbers of the modes, from 1 on: 2 at rest, 1 and 3 on the sides -1 and +1."""
+        return side + 2
+
+    def equation_sides(self, side: np.ndarray) -> np.ndarray:
+        """What the model's equations get as `side`."""
+        return side
+
+    def closed(self, side: np.ndarray) -> list[np.ndarray]:
+        """Whether each contact is closed."""
+        return [side == 0]
+
+    def slides(self, side: np.ndarray) -> list[np.ndarray]:
+        """The direction in which each friction slides, 0 where it sticks."""
+        return []
+
+    def image(self, parts: int, mode: int, images: Sequence[int]) -> tuple[int, int]:
+        """The mirror images of the parts and the mode of an event; `images` are the numbers of the images of contacts and
+        frictions."""
+        return parts, 4 - mode
+
+    def groups(self, position: Any) -> tuple[Group, ...]:
+        """The groups of contacts and frictions, at a position."""
+        return (Group(1, 3),)
+
+    def codes(self, motion: Motion) -> np.ndarray:
+        """The kinds of the events, and the contacts and frictions that act as bits, (n, 2). A single contact is the first bit,
+        and its rest is that of one that is held."""
+        kinds = motion.events.codes[:, 0]
+        return np.column_stack([np.where(kinds == EventCode.REST, EventCode.HELD, kinds), np.ones(len(kinds), int)])
+
+    def impact_speeds(self, motion: Motion) -> np.ndarray:
+        """The least speed at which each impact closes one of its contacts, (n,)."""
+        return np.asarray(np.abs(motion.impacts.velocity_before))
+
+    def listed(self, motion: Motion) -> np.ndarray:
+        """Times and speeds of the impacts, (n, 2); if several contacts close at one instant, each has its own row."""
+        return np.column_stack([motion.impacts.time, np.abs(motion.impacts.velocity_before)])
+
+    def gaps(self, side: np.ndarray) -> list[GapAlong]:
+        """The gaps of the contacts; that of a single contact on each side."""
+        one = self.system.one_contact
+        return [GapAlong(0, one.inward(number), float(one.contact), side == number) for number in one.sides]
+
+    def grazed(self, side: np.ndarray) -> list[GapAlong]:
+        """The gaps whose least value is a quantity of an orbit: where one of several contacts closes, its events change instead."""
+        return self.gaps(side)
+
+    def slidings(self, side: np.ndarray) -> list[tuple[int, float, np.ndarray]]:
+        """The place of the coordinate of each friction, the speed of its ground, and the direction in which it slides."""
+        return []
+
+    def holding(self, side: np.ndarray) -> list[tuple[list[np.ndarray], Callable[..., list[Any]]]]:
+        """Where coordinates are held, and the function of (model, t, q, v, a, load) whose values then are positive."""
+        pulls = [contact_pull(self.system, one) for one in self.system.one_contact.sides]
+        return [([side == 0 for _ in pulls], lambda model, t, *_: [-pull(t) for pull in pulls])]
+
+
+class ContactModes(SideModes):
+    """How motions with several contacts or frictions are read, whose modes are 1 plus the bits that `modes_of` reads."""
+
+    def numbers(self, side: np.ndarray) -> np.ndarray:
+        return side
+
+    def equation_sides(self, side: np.ndarray) -> np.ndarray:
+        return np.ones_like(side)
+
+    def closed(self, side: np.ndarray) -> list[np.ndarray]:
+        bits = modes_of(self.system.model, side)[0]
+        return [bits >> i & 1 == 1 for i in range(len(self.system.contact_model.contacts))]
+
+    def slides(self, side: np.ndarray) -> list[np.ndarray]:
+        return modes_of(self.system.model, side)[1]
+
+    def image(self, parts: int, mode: int, images: Sequence[int]) -> tuple[int, int]:
+        closed, slides = self.closed(np.array(mode)), self.slides(np.array(mode))
+        count, found = len(closed), 1
+        for is_closed, image in zip(closed, images[:count], strict=True):
+            found += int(is_closed) << image
+        for direction, image in zip(slides, images[count:], strict=True):
+            found += (1 - int(direction)) << (count + 2 * (image - count))
+        return sum(1 << image for i, image in enumerate(images) if parts >> i & 1), found
+
+    def groups(self, position: Any) -> tuple[Group, ...]:
+        """The contacts of each group if the mass matrix couples no coordinates of different groups; else one group of all."""
+        model = self.system.contact_model
+        contacts, frictions = self.system.contact_model.contacts, len(self.system.contact_model.frictions)
+        everything = (Group((1 << len(contacts) + frictions) - 1, (1 << len(contacts) + 2 * frictions) - 1),)
+        names = dict.fromkeys(contact.group for contact in contacts)
+        if len(names) < 2 or frictions:
+            return everything
+        mass = np.asarray(model.mass_matrix(position), dtype=float)
+        places = [[model.coordinates.index(c.coordinate) for c in contacts if c.group == name] for name in names]
+        if any(mass[np.ix_(own, other)].any() for own, other in combinations(places, 2)):
+            return everything
+        bits = [sum(1 << i for i, contact in enumerate(contacts) if contact.group == name) for name in names]
+        return tuple(Group(own, own) for own in bits)
+
+    def codes(self, motion: Motion) -> np.ndarray:
+        return motion.events.codes
+
+    def impact_speeds(self, motion: Motion) -> np.ndarray:
+        return np.asarray(self._closing_speeds(motion.impacts).min(axis=0, initial=math.inf))
+
+    def listed(self, motion: Motion) -> np.ndarray:
+        """Without those of accumulations."""
+        impacts, speeds = motion.impacts, self._closing_speeds(motion.impacts)
+        contact, impact = np.nonzero((speeds > DYING) & np.isfinite(speeds))
+        found = np.column_stack([impacts.time[impact], speeds[contact, impact]])
+        return np.asarray(found[np.argsort(found[:, 0], kind="stable")])
+
+    def _closing_speeds(self, impacts: Any) -> np.ndarray:
+        """The speed at which each contact is closed by each impact, (contacts, n); inf where it is not."""
+        names, contacts = self.system.model.coordinates, self.system.contact_model.contacts
+        speeds = np.full((len(contacts), len(impacts)), math.inf)
+        for i, contact in enumerate(contacts):
+            rates = np.abs(impacts.velocity_before[:, names.index(contact.coordinate)])
+            speeds[i] = np.where(impacts.side >> i & 1 == 1, rates, math.inf)
+        return speeds
+
+    def gaps(self, side: np.ndarray) -> list[GapAlong]:
+        names, pairs = self.system.model.coordinates, zip(self.system.contact_model.contacts, self.closed(side), strict=True)
+        return [GapAlong(names.index(c.coordinate), c.sign, float(c.position), ~closed) for c, closed in pairs]
+
+    def grazed(self, side: np.ndarray) -> list[GapAlong]:
+        return []
+
+    def slidings(self, side: np.ndarray) -> list[tuple[int, float, np.ndarray]]:
+        names, pairs = self.system.model.coordinates, zip(self.system.contact_model.frictions, self.slides(side), strict=True)
+        return [(names.index(f.coordinate), float(f.ground_speed), direction) for f, direction in pairs]
+
+    def holding(self, side: np.ndarray) -> list[tuple[list[np.ndarray], Callable[..., list[Any]]]]:
+        sticks = [direction == 0 for direction in self.slides(side) for _ in range(2)]
+        return [(self.closed(side), reactions), (sticks, stick_margins)]
+
+
+def modes_in(system: System) -> SideModes:
+    """How the motions of a system are read."""
+    return (ContactModes if system.model.holds_coordinates else SideModes)(system)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +260,9 @@ class SampledMotion:
         """The least value of each of the model's margins."""
         system = self.motion.system
         least = dict.fromkeys(system.model.margin_names(system.load), np.inf)
+        sides = modes_in(system).equation_sides(self.side)
         for side in system.model.every_side:
-            own = self if system.model.holds_coordinates else self.only(np.flatnonzero(self.side == side))
+            own = self.only(np.flatnonzero(sides == side))
             values = system.model.margins(own.time, *own._state(), side, system.load) if own.time.size else {}
             for name, value in values.items():
                 least[name] = min(least[name], _least(np.broadcast_to(value, own.time.shape)))
@@ -103,24 +270,15 @@ class SampledMotion:
 
     def lowest_gap(self) -> float:
         """The lowest inner minimum of the gap of a single contact, inf without one."""
-        if self.motion.system.model.holds_coordinates:
-            return np.inf
-        least, one = [np.inf], self.motion.system.one_contact
-        for side in one.sides:
-            inward = one.inward(side)
-            course = inward * self.series[:, 0]
-            course[:, 0] -= inward * float(one.contact)
-            least.append(self._turning_of(course, inward * self.velocity[0], self.side == side))
-        return float(min(least))
+        return self._lowest_of(modes_in(self.motion.system).grazed(self.side))
 
-    def _nearest_of_one(self) -> float:
-        """`nearest_touch` with a single contact: its gap's minima, and how far the load is from pulling it open while it is at
-        rest."""
-        system, steps, least = self.motion.system, np.flatnonzero(self.side == 0), [self.lowest_gap()]
-        pulls = [contact_pull(system, side) for side in system.model.sides]
-        if steps.size:
-            resting = [np.ones(steps.size, dtype=bool) for _ in pulls]
-            least.append(self.only(steps)._dip(steps, resting, lambda model, t, *_: [-pull(t) for pull in pulls]))
+    def _lowest_of(self, gaps: list[GapAlong]) -> float:
+        """The lowest inner minimum of any of these gaps, inf without one."""
+        least = [np.inf]
+        for place, sign, position, is_open in gaps:
+            course = np.asarray(sign * self.series[:, place], dtype=float)
+            course[:, 0] -= sign * position
+            least.append(self._turning_of(course, sign * self.velocity[place], is_open))
         return float(min(least))
 
     def nearest_touch(self) -> float:
@@ -130,24 +288,13 @@ class SampledMotion:
 
         For reactions and sticking frictions the value just after an event counts too. inf without such minima.
         """
-        model, names = self.motion.system.model, self.motion.system.model.coordinates
-        if not model.holds_coordinates:
-            return self._nearest_of_one()
-        closed, slides = modes_of(model, self.side)
-        least = [np.inf]
-        for i, contact in enumerate(model.contacts):
-            place, is_open = names.index(contact.coordinate), closed >> i & 1 == 0
-            course = contact.sign * self.series[:, place]
-            course[:, 0] -= contact.sign * float(contact.position)
-            least.append(self._turning_of(course, contact.sign * self.velocity[place], is_open))
-        for friction, s in zip(model.frictions, slides, strict=True):
-            place = names.index(friction.coordinate)
+        modes = modes_in(self.motion.system)
+        least = [self._lowest_of(modes.gaps(self.side))]
+        for place, ground_speed, s in modes.slidings(self.side):
             course = s[:, None] * (self.series[:, place] * ORDERS[: self.series.shape[2]])[:, 1:]
-            course[:, 0] -= s * float(friction.ground_speed)
+            course[:, 0] -= s * ground_speed
             least.append(self._turning_of(course, s[:, None] * self.acceleration[place], s != 0))
-        holds = [closed >> i & 1 == 1 for i in range(len(model.contacts))]
-        sticks = [s == 0 for s in slides for _ in range(2)]
-        for chosen, forces in ((holds, reactions), (sticks, stick_margins)):
+        for chosen, forces in modes.holding(self.side):
             steps = np.flatnonzero(np.any(chosen, axis=0)) if chosen else np.empty(0, dtype=int)
             if steps.size:
                 least.append(self.only(steps)._dip(steps, [mask[steps] for mask in chosen], forces))

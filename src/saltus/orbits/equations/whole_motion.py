@@ -49,13 +49,12 @@ from saltus.orbits.branches.special_point import OrbitEnd
 from saltus.orbits.branches.symmetry import nearest
 from saltus.orbits.equations.contract import MotionToRead, OrbitEquations, OrbitEvaluation, Restart, Solution
 from saltus.orbits.equations.event_sequence import STAYS, EventSequence, section_of, sequence_of
-from saltus.orbits.equations.sampled_motion import SampledMotion
+from saltus.orbits.equations.sampled_motion import SampledMotion, modes_in
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
-from saltus.systems import System, arguments_of, image_of
+from saltus.systems import System, arguments_of, held_values, image_of
 from saltus.taylor import FREQUENCY
 
-DYING = 1e-5  # Slower impacts are not listed: they belong to an accumulation.
 CLOSED = 1e-9  # A contact is closed at the section if its gap and the gap's rate are smaller than this there.
 
 
@@ -191,17 +190,8 @@ class WholeMotionEquations(OrbitEquations):
         return same_events(point)
 
     def held(self, state: np.ndarray, system: System) -> dict[int, float]:
-        """The state variables that are fixed at the section, up to rounding, with their values: coordinates that contacts hold,
-        their velocities, and the velocities of coordinates that stick."""
-        found, own, names = dict[int, float](), self.own, system.model.coordinates
-        for contact in system.model.contacts:
-            place = names.index(contact.coordinate)
-            if abs(contact.gap(state[place])) < CLOSED and abs(state[own + place]) < CLOSED:
-                found |= {place: float(contact.position), own + place: 0.0}
-        for friction in system.model.frictions:
-            place, speed = own + names.index(friction.coordinate), float(friction.ground_speed)
-            found |= {place: speed} if abs(state[place] - speed) < CLOSED else {}
-        return found
+        """The state variables that are fixed at the section, up to rounding, with their values."""
+        return held_values(system, state, CLOSED)
 
     def start_state(self, unknowns: np.ndarray, system: System) -> np.ndarray:
         """The state at the section, in which contacts that are closed, and frictions that stick, up to rounding do so exactly."""
@@ -254,7 +244,7 @@ class WholeMotionEquations(OrbitEquations):
         if self.signature.symmetric:
             after, state, parameters = (image_of(system.model, numbers.T).T for numbers in (after, state, parameters))
         here, there = state[None], -np.eye(len(after))[None]
-        residual, impacts = after - unknowns, self._impacts(motion)
+        residual, impacts = after - unknowns, modes_in(self.system).listed(motion)
         return motion, WholeMotionEvaluation(residual, here, there, parameters, impacts, self._extremes(None), None, None)
 
     def state_at(self, phase: float, unknowns: np.ndarray, values: np.ndarray, near: np.ndarray) -> np.ndarray | None:
@@ -293,18 +283,6 @@ class WholeMotionEquations(OrbitEquations):
             sensitivities=self.paths,
         )
         return derivatives_of(request, self._program.with_numbers(parameters, self._records))
-
-    def _impacts(self, motion: Motion) -> np.ndarray:
-        """Times and speeds of the impacts, (n, 2), without those of accumulations; if several contacts close at one instant, each
-        has its own row."""
-        if not self.system.model.holds_coordinates:
-            return np.column_stack([motion.impacts.time, np.abs(motion.impacts.velocity_before)])
-        impacts, names, rows = motion.impacts, self.system.model.coordinates, [np.empty((0, 2))]
-        for i, contact in enumerate(self.system.model.contacts):
-            speeds = np.abs(impacts.velocity_before[:, names.index(contact.coordinate)])
-            rows.append(np.column_stack([impacts.time, speeds])[(impacts.side >> i & 1 == 1) & (speeds > DYING)])
-        found = np.concatenate(rows)
-        return np.asarray(found[np.argsort(found[:, 0], kind="stable")])
 
     def _extremes(self, sampled: SampledMotion | None) -> np.ndarray:
         """The extrema of all coordinates and the least values of the margins, in the columns that other orbits use."""
