@@ -27,7 +27,6 @@ from .long_time.load_release import peak_near as peak_near
 from .long_time.recurrence import RECURRENCE as RECURRENCE
 from .long_time.recurrence import Ending as Ending
 from .long_time.recurrence import Recurrence as Recurrence
-from .long_time.recurrence import RecurrenceSettings as RecurrenceSettings
 from .long_time.recurrence import ensemble_from as ensemble_from
 from .long_time.recurrence import find_recurrence as find_recurrence
 from .long_time.recurrence import last_states as last_states

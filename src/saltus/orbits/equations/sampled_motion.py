@@ -95,7 +95,7 @@ class SideModes:
         return [GapAlong(0, one.inward(number), float(one.contact), side == number) for number in one.sides]
 
     def grazed(self, side: np.ndarray) -> list[GapAlong]:
-        """The gaps whose least value is a quantity of an orbit: where one of several contacts closes, its events change instead."""
+        """The gaps whose least value is a quantity of an orbit; where one of several contacts closes, its events change."""
         return self.gaps(side)
 
     def slidings(self, side: np.ndarray) -> list[tuple[int, float, np.ndarray]]:
@@ -292,7 +292,7 @@ class SampledMotion:
         least = [self._lowest_of(modes.gaps(self.side))]
         for place, ground_speed, s in modes.slidings(self.side):
             course = s[:, None] * (self.series[:, place] * ORDERS[: self.series.shape[2]])[:, 1:]
-            course[:, 0] -= s * ground_speed
+            course[:, 0] = course[:, 0] - s * ground_speed
             least.append(self._turning_of(course, s[:, None] * self.acceleration[place], s != 0))
         for chosen, forces in modes.holding(self.side):
             steps = np.flatnonzero(np.any(chosen, axis=0)) if chosen else np.empty(0, dtype=int)
