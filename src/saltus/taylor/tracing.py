@@ -211,8 +211,7 @@ def trace(system: System, stop_at: tuple[str, ...] = (), sensitivities: tuple[st
     twin = substitute_numbers(system, result.symbol)
     _name_records(twin.load)
     object.__setattr__(twin, "load", DeclaredLoad(twin.load, twin.model))
-    model, load, t = twin.model, twin.load, LoadTime(result)
-    dof = len(model.coordinates)
+    model, load, t, dof = twin.model, twin.load, LoadTime(result), result.dof
     coordinates = tuple(Expr("coordinate", (), i) for i in range(dof))
     velocities = tuple(Expr("velocity", (), i) for i in range(dof))
     side = Expr("side") if sides else number(1.0)
@@ -313,9 +312,8 @@ def _known_number(expression: Expr) -> float | Fraction | None:
 
 def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> list[Any]:
     """Trace the accelerations of a model with several contacts, for any choice of closed ones."""
-    model, load, count = twin.contact_model, twin.load, len(twin.model.coordinates)
-    contacts, frictions = twin.contact_model.contacts, twin.contact_model.frictions
-    free = [Expr("free", (), i) for i in range(count)]
+    model, load, contacts, frictions = twin.contact_model, twin.load, twin.contact_model.contacts, twin.contact_model.frictions
+    free = [Expr("free", (), i) for i in range(result.dof)]
     slides = [Expr("slide", (), k) for k in range(len(frictions))]
     mass, _ = mass_and_force(model, t, q, v, load)
     if frictions and not apart(model, mass):
@@ -323,7 +321,7 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
             f"the mass matrix of {type(model).__name__} connects a coordinate with a contact to one with a friction: impacts "
             "would act on what sticks, which is not followed; choose coordinates in which it does not"
         )
-    accelerations = [Expr("acceleration", (), i) for i in range(count)]
+    accelerations = [Expr("acceleration", (), i) for i in range(result.dof)]
     holding = [*reactions(model, t, q, v, accelerations, load), *stick_margins(model, t, q, v, accelerations, load)]
     result.reactions = [combine("add", r, 0.0) for r in holding]
     result.ground_speeds = [combine("add", friction.ground_speed, 0.0) for friction in frictions]
@@ -339,9 +337,8 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
 def _trace_margins(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any, side: Expr, stop_at: tuple[str, ...]) -> None:
     if not stop_at:
         return
-    dof = len(twin.model.coordinates)
-    a = tuple(Expr("acceleration", (), i) for i in range(dof))
-    margins = dict(ask(twin.model, "margins", t, q, v, a[0] if dof == 1 else a, side, twin.load))
+    a = tuple(Expr("acceleration", (), i) for i in range(result.dof))
+    margins = dict(ask(twin.model, "margins", t, q, v, a[0] if result.dof == 1 else a, side, twin.load))
     forces = normal_forces(twin.model, t, q, v, twin.load)
     margins |= {friction.limit: force for friction, force in zip(twin.model.frictions, forces, strict=True)}
     for name in stop_at:
