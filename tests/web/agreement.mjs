@@ -13,7 +13,8 @@ for (const { wasm, description, motions } of tasks) {
       const motion = engine.simulate(engine.system(values), start, duration ?? 0, periods === undefined ? {} : { periods });
       const { stop, reason, end, time } = motion;
       const events = motion.events.map((event) => [event.time, event.kind, event.contact, event.before, event.after]);
-      return { stop, reason, end: [...end], last: time.last, events, states: at.map((t) => [...motion.state(t)]) };
+      const energies = at.map((t) => motion.energy(t));
+      return { stop, reason, end: [...end], last: time.last, events, states: at.map((t) => [...motion.state(t)]), energies, validity: motion.validity };
     }),
   );
 }

@@ -2,31 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
-import shutil
 from typing import Any
 
 import pytest
 import stand_in
-from browser_page import BrowserPage
+from computing_page import BROWSER, SETTLED, ComputingPage, click_at, field, place, saved, state
 
-NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge")
-BROWSER = next(filter(None, map(shutil.which, NAMES)), None)
 pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium, Chrome or Edge is installed here")
-
-SETTLED = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done, 0))))"
-
-READY = "new Promise((done) => { const look = () => (globalThis.saltusPage ? done() : requestAnimationFrame(look)); look(); })"
-
-
-class ComputingPage(BrowserPage):
-    """A page that has unpacked itself once it is open."""
-
-    def go(self, address: str) -> None:
-        super().go(address)
-        if address != "about:blank":
-            self.evaluate(READY)
 
 
 def spectrum() -> dict[str, Any]:
@@ -81,29 +64,6 @@ def page(window, file):
     window.open(file, 1440, 1000)
     yield window
     assert window.errors == []  # of its scripts, or of what its policy refused
-
-
-def state(page: BrowserPage) -> dict[str, Any]:
-    page.evaluate(SETTLED)
-    return page.evaluate("saltusPage.store.state")
-
-
-def field(path: str, part: str = ".value") -> str:
-    return f'[data-path="{path}"] {part}'
-
-
-def place(page: BrowserPage, view: str, x: float, y: float) -> tuple[float, float]:
-    """Where a point of a view's plane stands in the window."""
-    script = """(() => { const plot = saltusPage.plotOf(%s); plot.top.scrollIntoView({block: "center"});
-    const painter = plot.painter(plot.top.getContext("2d"), {}); const box = plot.top.getBoundingClientRect();
-    return [box.x + painter.x(%r), box.y + painter.y(%r)]; })()"""
-    return tuple(page.evaluate(script % (json.dumps(view), x, y)))
-
-
-def click_at(page: BrowserPage, view: str, x: float, y: float) -> None:
-    left, top = place(page, view, x, y)
-    for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
-        page.point(kind, left, top)
 
 
 def test_the_page_opens_from_disk_and_asks_for_nothing_else(page):
@@ -271,10 +231,7 @@ def test_a_sweep_carries_the_motion_up_and_down(page):
 
 
 def test_pictures_and_columns_are_exported(page):
-    svg = page.evaluate("""(() => { let kept = null; const make = URL.createObjectURL;
-    URL.createObjectURL = (blob) => { kept = blob; return make(blob); };
-    document.querySelector('[aria-label="Phase plane as SVG"]').click();
-    URL.createObjectURL = make; return kept.text(); })()""")
+    svg = saved(page, '[aria-label="Phase plane as SVG"]')
     assert svg.startswith("<svg")
     assert svg.count("<path") > 8
     columns = page.evaluate("saltusPage.plots.map(({view}) => Object.entries(view.csv()).map(([n, c]) => [n, c.length]))")

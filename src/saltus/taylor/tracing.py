@@ -192,11 +192,13 @@ class Trace:
         return total
 
 
-def trace(system: System, stop_at: tuple[str, ...] = (), sensitivities: tuple[str, ...] | None = None) -> Trace:
+def trace(
+    system: System, stop_at: tuple[str, ...] = (), sensitivities: tuple[str, ...] | None = None, energy: bool = False
+) -> Trace:
     """Trace the model, the load and the impact law of a system, and the margins at which a motion stops.
 
     If `sensitivities` is given, as dotted paths (maybe none), the tangent is traced as well: the derivatives to the state at the
-    start and to the numbers at these paths.
+    start and to the numbers at these paths. With `energy` the kinetic energy stands behind the margins.
 
     Raises
     ------
@@ -212,8 +214,7 @@ def trace(system: System, stop_at: tuple[str, ...] = (), sensitivities: tuple[st
     _name_records(twin.load)
     object.__setattr__(twin, "load", DeclaredLoad(twin.load, twin.model))
     model, load, t, dof = twin.model, twin.load, LoadTime(result), result.dof
-    coordinates = tuple(Expr("coordinate", (), i) for i in range(dof))
-    velocities = tuple(Expr("velocity", (), i) for i in range(dof))
+    coordinates, velocities = (tuple(Expr(op, (), i) for i in range(dof)) for op in ("coordinate", "velocity"))
     side = Expr("side") if sides else number(1.0)
     q, v = (coordinates[0], velocities[0]) if dof == 1 else (coordinates, velocities)
     several = model.holds_coordinates
@@ -225,6 +226,8 @@ def trace(system: System, stop_at: tuple[str, ...] = (), sensitivities: tuple[st
     if sides:
         _trace_contact(result, twin, t, coordinates, velocities, side)
     _trace_margins(result, twin, t, q, v, side, stop_at)
+    if energy:
+        result.margins["kinetic_energy"] = combine("add", ask(model, "kinetic_energy", t, q, v, side, load), 0.0)
     _check(result)
     if paths is not None:
         result.append_tangent(paths)
@@ -343,17 +346,15 @@ def _trace_margins(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any, side: 
     margins |= {friction.limit: force for friction, force in zip(twin.model.frictions, forces, strict=True)}
     for name in stop_at:
         if name not in margins:
-            raise ParameterError(
-                f"{type(twin.model).__name__} has no margin {name!r} to stop at; {near(name, margins)}", "stop_at"
-            )
+            message = f"{type(twin.model).__name__} has no margin {name!r} to stop at; {near(name, margins)}"
+            raise ParameterError(message, "stop_at")
         result.margins[name] = combine("add", margins[name], 0.0)
 
 
 def _check(result: Trace) -> None:
     """Refuse comparisons in expressions that are expanded in series, and a gap that depends on more than the coordinate."""
-    expanded = [*result.acceleration, *result.reactions, *result.margins.values()]
-    if result.gap is not None:
-        expanded += [result.gap]
+    gap = [] if result.gap is None else [result.gap]
+    expanded = [*result.acceleration, *result.reactions, *result.margins.values(), *gap]
     check_size(result)
     for node in ordered(expanded):
         if node.op in POINTWISE:

@@ -182,7 +182,7 @@ def _basins(data: Any) -> dict[str, Any]:
     attractors = [{"label": int(n) - 1, "name": name} for n, name in zip(data["attractor"].values, names, strict=True)]
     return {
         "kind": "basins",
-        "plane": [x, y],
+        "plane": _plane(x, y),
         "x": _listed(data[x].values),
         "y": _listed(data[y].values),
         "cells": [[int(each) - 1 for each in row] for row in label],
@@ -197,7 +197,12 @@ def _curve(data: Any) -> dict[str, Any]:
     points = np.column_stack([data[name].values for name in plane])
     kind = str(data.attrs["kind"])
     curve = {"name": kind, "stable": stable, "points": [[_number(a), _number(b)] for a, b in points.tolist()]}
-    return {"kind": "curves", "plane": plane, "curves": [curve]}
+    return {"kind": "curves", "plane": _plane(*plane), "curves": [curve]}
+
+
+def _plane(x: str, y: str) -> list[str]:
+    """The names of both axes as the page has them: each velocity with that of its coordinate."""
+    return [x, f"{x}_velocity" if y == "velocity" else y]
 
 
 def _listed(values: np.ndarray) -> list[float | None]:

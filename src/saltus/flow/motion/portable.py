@@ -7,6 +7,7 @@ by tables that are made from the types with which they are compiled, so that nob
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import count
 from typing import Any
 
@@ -89,16 +90,20 @@ class PortableMotion:
         twin = substitute(self.system, lambda path, value: Expr("parameter", (), next(places)))
         pulses = [part_at(twin, path) for path in self._pulses]
         edges = edges_function([t for p in pulses for t in (p.start, p.start + p.length)])
-        return [*structure_functions(self.run.trace), edges, margins_function(*self._margins())]
+        return [*structure_functions(self.run.trace), edges, margins_function(*self._evaluated[:2])]
 
-    def _margins(self) -> tuple[Trace, tuple[str, ...]]:
-        """A trace with the margins that a page can compute, and their names."""
+    @cached_property
+    def _evaluated(self) -> tuple[Trace, tuple[str, ...], bool]:
+        """A trace with what a page can compute along a motion, the names of it all, and whether the kinetic energy is the last."""
         names = self.system.model.margin_names(self.system.load)
-        try:
-            traced = trace(self.system, names)
-        except SaltusError:  # some may compare, which only Python's own check of a motion can
-            return self.run.trace, ()
-        return (traced, names) if traced.records == self.run.trace.records else (self.run.trace, ())
+        for chosen, energy in ((names, True), (names, False), ((), True)):
+            try:
+                traced = trace(self.system, chosen, energy=energy)
+            except SaltusError:  # margins may compare, which only Python's own check of a motion can; and not all have an energy
+                continue
+            if traced.records == self.run.trace.records:
+                return traced, tuple(traced.margins), energy
+        return self.run.trace, (), False
 
     def layout(self) -> dict[str, Any]:
         """Where all numbers are in memory, and what those of the kernel mean."""
@@ -123,7 +128,8 @@ class PortableMotion:
             "contact_numbers": len(trace.contact_numbers),
             "limits": list(self.run.limits),
             "records": self._records(),
-            "margins": list(self._margins()[1]),
+            "margins": list(self._evaluated[1]),
+            "energy": self._evaluated[2],
             "event_kinds": [str(kind) for kind in EventKind],
             "refusals": {
                 int(status): text for status in Status if (text := refusal(self.system, status, "{time}", "{velocity}"))

@@ -136,11 +136,17 @@ export class Basins {
     const near = (/** @type {Attractor} */ a) => a.period === period && a.section.every((value, i) => Math.abs(value - (section[i] ?? 0)) < apart);
     let label = this.attractors.findIndex(near);
     if (label < 0) {
-      const name = period === 0 ? "rest" : `period ${period}, amplitude ${Number(amplitude.toPrecision(4))}`;
+      const name = period === 0 ? "rest" : this.session.period ? `period ${period}, amplitude ${Number(amplitude.toPrecision(4))}` : this.equilibrium(section);
       label = this.attractors.push({ name, period, amplitude, section, cells: 0 }) - 1;
     }
     /** @type {Attractor} */ (this.attractors[label]).cells++;
     return label;
+  }
+
+  /** @param {number[]} section */
+  equilibrium(section) {
+    const where = this.session.coordinates.map(({ name }, i) => `${name} = ${Number((section[i] ?? NaN).toPrecision(4))}`);
+    return `equilibrium, ${where.join(", ")}`;
   }
 
   finish() {

@@ -25,6 +25,7 @@ export class NumberField {
     this.entry = entry;
     this.host = host;
     this.id = `number-${++fields}`;
+    this.typing = false; // a text that is being typed stays as it is
     this.name = entry.path.split(".").slice(1).join(".") || entry.path;
     this.element = document.createElement("div");
     this.element.className = "number";
@@ -101,8 +102,17 @@ export class NumberField {
       const raw = from + ((to - from) * Number(slider.value)) / SLIDER_STEPS;
       this.change(this.rounded(raw, (to - from) / SLIDER_STEPS));
     });
-    text?.addEventListener("change", () => this.typed(text.value));
-    text?.addEventListener("keydown", (event) => event.key === "Escape" && this.show());
+    text?.addEventListener("input", () => (this.typing = true));
+    text?.addEventListener("blur", () => (this.typing = false));
+    text?.addEventListener("change", () => {
+      this.typing = false;
+      this.typed(text.value);
+    });
+    text?.addEventListener("keydown", (event) => {
+      if (event.key !== "Escape") return;
+      this.typing = false;
+      this.show();
+    });
     low?.addEventListener("change", () => this.rangeTyped(low, 0));
     high?.addEventListener("change", () => this.rangeTyped(high, 1));
     reset?.addEventListener("click", () => this.change(this.entry.value));
@@ -167,6 +177,7 @@ export class NumberField {
 
   /** Show the number as it is. */
   show() {
+    if (this.typing) return;
     const value = this.host.value(this.entry.path);
     const [low, high] = this.range();
     if (this.text) this.text.value = this.written(value);

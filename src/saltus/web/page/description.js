@@ -36,6 +36,11 @@ export function isPeriodic(description) {
   return entriesOf(description).some(({ path }) => path === "load.frequency");
 }
 
+/** Whether the load is the same after each period, or at all times, so that motions settle under it. @param {Description} description */
+export function goesOn(description) {
+  return isPeriodic(description) || description.load.every(({ kind }) => kind === "Constant");
+}
+
 /** All numbers of a system, in the order in which the page shows them. @param {Description} description */
 export function entriesOf(description) {
   const impact = description.impact?.parameters ?? [];

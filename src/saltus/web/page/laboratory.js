@@ -3,6 +3,7 @@
 import { parameterName, parameterSymbol, symbolOf } from "./symbols.js";
 import { rangeOf, shortly, typedNumber } from "./numbers.js";
 import { axisName } from "./views.js";
+import { goesOn } from "./description.js";
 import { jumpsOf } from "./sweep.js";
 import { button } from "./transport.js";
 
@@ -143,7 +144,7 @@ export function basinsView(session, basins, startAt) {
     id: "basins", title: "Basins of attraction", instructions: "A click starts a motion there.",
     axes: () => ({ x: { name: axisName(coordinate().name, coordinate().unit) }, y: { name: axisName(`${coordinate().name}_velocity`, coordinate().unit) } }),
     bounds: () => (basins.labels.length ? /** @type {any} */ (basins.window) : null),
-    empty: () => (session.period ? "Press “Compute basins”: every cell is a motion of its own." : "Basins need a load that repeats itself."),
+    empty: () => (goesOn(session.description) ? "Press “Compute basins”: every cell is a motion of its own." : "Basins need a load that repeats itself or is constant."),
     paint: (painter) => {
       const [x0, x1, y0, y1] = /** @type {[number, number, number, number]} */ (basins.window);
       image = basins.image(painter.palette.basins, painter.palette.paper);

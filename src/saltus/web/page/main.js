@@ -16,7 +16,7 @@ import { BASIN_GRID, Basins } from "./basins.js";
 import { basinsLegend, basinsView, sweepControls, sweepSaid, sweepView } from "./laboratory.js";
 import { Choice, differingSaid, ofThisSystem, orbitSaid, paintBeneath, resultView } from "./results_view.js";
 import { currentPalette } from "./palette.js";
-import { entriesOf, firstState, isPeriodic, spaced, startEntries, tamed } from "./description.js";
+import { entriesOf, firstState, goesOn, isPeriodic, spaced, startEntries, tamed } from "./description.js";
 import { Embedding } from "./embedding.js";
 
 /** @typedef {import("./types.js").Description} Description */
@@ -26,6 +26,7 @@ import { Embedding } from "./embedding.js";
 /** @typedef {import("./views.js").View} View */
 
 const BASIN_PERIODS = 100; // of each motion of a basin at most
+const QUIET = 200; // milliseconds after the last change before the margins of the whole motion are followed
 
 /**
  * The page.
@@ -46,6 +47,8 @@ export class Page {
     this.plots = [];
     /** @type {import("./controls.js").NumberField[]} */
     this.fields = [];
+    /** @type {ReturnType<typeof setTimeout>|undefined} */
+    this.checking = undefined;
     this.address = new Address(this.store, this.first, description, (found) => this.linked(found));
     this.results = description.results ?? [];
     /** Which of the results is shown, or -1. */
@@ -210,7 +213,7 @@ export class Page {
     if (!this.basins.done) {
       this.basins.stop();
       this.basinsTold();
-    } else if (this.session.period) this.basins.start(this.planeWindow(), BASIN_PERIODS);
+    } else if (goesOn(this.description)) this.basins.start(this.planeWindow(), BASIN_PERIODS);
   }
 
   /** The window of the phase plane, over which basins are computed. */
@@ -343,12 +346,22 @@ export class Page {
 
   drawAll() {
     const energy = at("view-energy").closest("figure");
-    if (energy) energy.hidden = this.session.motion !== null && !this.session.motion?.energy; // not every engine gives it
+    const { motion } = this.session;
+    if (energy) energy.hidden = motion !== null && (motion.energy?.(motion.time.first) ?? null) === null; // not every model has one
     this.stage.draw();
     for (const { plot } of this.plots) plot.draw();
     this.transport.show();
     this.sayValidity();
+    this.sayAll();
+  }
+
+  /** What is said of the whole motion; its margins are followed once the reader is quiet, as that takes longer than a picture. */
+  sayAll() {
+    const { motion } = this.session;
     at("summary").textContent = validityOfAll(this.session);
+    clearTimeout(this.checking);
+    if (motion?.checked !== null) return;
+    this.checking = setTimeout(() => motion === this.session.motion && motion.validity && this.sayAll(), QUIET);
   }
 
   sayValidity() {

@@ -43,6 +43,12 @@ export class Session {
     return state.periods * (this.period ?? 1);
   }
 
+  /** As the study asks for it, so that the motion is Python's. @param {State} state */
+  options(state) {
+    const tolerance = this.description.study.simulate.tol;
+    return { ...(tolerance === undefined ? {} : { tolerance }), ...(this.system?.period ? { periods: state.periods } : {}) };
+  }
+
   /** Whether these numbers are accepted: null, or what the engine refuses. @param {Record<string, number>} values */
   refusalOf(values) {
     const refused = refusedNumbers(this.entries, values);
@@ -66,7 +72,7 @@ export class Session {
     }
     try {
       this.system = this.engine.system(state.values);
-      this.motion = this.engine.simulate(this.system, state.start, this.duration(state));
+      this.motion = this.engine.simulate(this.system, state.start, this.duration(state), this.options(state));
       this.curve = this.sampled(this.motion);
     } catch (error) {
       this.refusal = refusalFrom(error);

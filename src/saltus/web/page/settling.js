@@ -7,7 +7,8 @@ const CHUNK = 8; // forcing periods between two looks: a motion that has settled
 const LONGEST = 8; // periods of a cycle that is looked for
 const REPEATS = 1e-8; // how near a state must come to itself for a new cycle
 const REACHED = 1e-3; // how near it must come, twice, to a cycle that is known
-const SAMPLES = 64; // of a forcing period, for the amplitude
+const SAMPLES = 64; // of a forcing period, between which the largest is looked for
+const NEARLY = 0.01; // Samples nearer than this share to the largest one may have the true one beside them.
 
 export class Settling {
   /** @param {Engine} engine @param {import("./types.js").Description} description */
@@ -88,20 +89,52 @@ export class Settling {
       const points = past.slice(last - q + 1);
       const still = q === 1 && motion.stop === "rest";
       const section = /** @type {number[]} */ ([...points].sort(lexicographic)[0]);
-      const cycle = { period: still ? 0 : q, amplitude: this.amplitude(motion, Math.min(q, CHUNK) * period), section, points };
+      const cycle = { period: still ? 0 : q, amplitude: this.amplitude(motion, Math.min(q, CHUNK) * period, period), section, points };
       this.known.push(cycle);
       return cycle;
     }
     return null;
   }
 
-  /** The largest size of any coordinate over the last `span` of a motion. @param {import("./types.js").Motion} motion @param {number} span */
-  amplitude(motion, span) {
-    const count = Math.ceil(span / (motion.time.last / CHUNK)) * SAMPLES;
-    const times = new Float64Array(count + 1).map((_, i) => motion.time.last - span + (span * i) / count);
-    const found = motion.sample(times);
-    return this.names.reduce((most, name) => (found[name] ?? []).reduce((high, x) => Math.max(high, Math.abs(x)), most), 0);
+  /** The largest size of any coordinate over the last `span` of a motion. @param {import("./types.js").Motion} motion @param {number} span @param {number} period */
+  amplitude(motion, span, period) {
+    return Math.max(...this.names.map((_, i) => amplitudeOf(motion, i, motion.time.last - span, period)));
   }
+}
+
+/**
+ * The largest size of a coordinate from a time to the end of a motion: between samples by golden sections, about all samples that
+ * are nearly the largest.
+ * @param {import("./types.js").Motion} motion @param {number} coordinate @param {number} from @param {number} period
+ */
+export function amplitudeOf(motion, coordinate, from, period) {
+  const { last } = motion.time;
+  const count = Math.max(2, Math.ceil(((last - from) / period) * SAMPLES));
+  const at = (/** @type {number} */ i) => from + ((last - from) * Math.min(Math.max(i, 0), count)) / count;
+  const size = (/** @type {number} */ time) => Math.abs(motion.state(time)[coordinate] ?? NaN);
+  const sizes = Array.from({ length: count + 1 }, (_, i) => size(at(i)));
+  const most = sizes.reduce((high, x) => Math.max(high, x), 0);
+  const high = sizes.flatMap((x, i) => (x > (1 - NEARLY) * most && x >= (sizes[i - 1] ?? 0) && x >= (sizes[i + 1] ?? 0) ? [i] : []));
+  return high.reduce((best, i) => Math.max(best, sizes[i] ?? 0, golden(size, at(i - 1), at(i + 1))), most);
+}
+
+/** The largest value between two places, of a function with one maximum between them. @param {(x: number) => number} f @param {number} low @param {number} high */
+function golden(f, low, high) {
+  const share = (Math.sqrt(5) - 1) / 2;
+  let [a, b] = [high - share * (high - low), low + share * (high - low)];
+  let [before, after] = [f(a), f(b)];
+  while (b - a > 1e-9 * (1 + Math.abs(b))) {
+    if (before > after) {
+      [high, b, after] = [b, a, before];
+      a = high - share * (high - low);
+      before = f(a);
+    } else {
+      [low, a, before] = [a, b, after];
+      b = low + share * (high - low);
+      after = f(b);
+    }
+  }
+  return Math.max(before, after);
 }
 
 /** @param {number} period @returns {Cycle} */

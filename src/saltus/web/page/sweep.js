@@ -3,11 +3,13 @@
  * It is computed in slices between pictures, so that the page stays alive, and a jump is where the amplitude leaps.
  */
 
+import { goesOn } from "./description.js";
+import { amplitudeOf } from "./settling.js";
+
 /** @typedef {import("./session.js").Session} Session */
 
 const SLICE = 10; // milliseconds of work between two pictures
 const WATCHED = 4; // periods at the end of each value over which the amplitude is taken
-const SAMPLES = 96; // of each of these periods
 const LEAP = 5; // times the usual change from value to value: more is a jump
 const LEAST_LEAP = 0.02; // of the largest amplitude
 
@@ -36,6 +38,10 @@ export class Sweep {
     const { store, engine } = this.session;
     const { values, start, sweep, coordinate } = store.state;
     this.result = { up: [], down: [], done: false, refusal: "" };
+    if (!goesOn(this.session.description)) {
+      this.result = { ...this.result, done: true, refusal: "a sweep needs a load that repeats itself or is constant" };
+      return this.tell(this.result);
+    }
     const steps = Math.max(2, Math.round(sweep.count));
     const along = Array.from({ length: steps }, (_, i) => sweep.low + ((sweep.high - sweep.low) * i) / (steps - 1));
     /** @type {Record<string, number>} */
@@ -72,12 +78,8 @@ export class Sweep {
 function settled(session, engine, values, start, periods, coordinate) {
   const system = engine.system(values);
   const period = system.period ?? 2 * Math.PI;
-  const motion = engine.simulate(system, start, periods * period);
+  const motion = engine.simulate(system, start, periods * period, system.period ? { periods } : {});
   const { first, last } = motion.time;
-  const { name } = /** @type {any} */ (session.coordinates[coordinate]);
-  const from = Math.max(first, last - WATCHED * period);
-  const times = new Float64Array(WATCHED * SAMPLES + 1).map((_, i) => from + ((last - from) * i) / (WATCHED * SAMPLES));
-  const found = motion.sample(times)[name] ?? new Float64Array(0);
   const state = Array.from(motion.state(last));
   /** @type {Record<string, number>} */
   const next = { time: 0 };
@@ -86,7 +88,7 @@ function settled(session, engine, values, start, periods, coordinate) {
     next[each.velocity] = state[i + session.coordinates.length] ?? 0;
   });
   const ended = motion.stop !== "horizon" && motion.stop !== "rest";
-  const amplitude = ended ? NaN : found.reduce((most, x) => Math.max(most, Math.abs(x)), 0);
+  const amplitude = ended ? NaN : amplitudeOf(motion, coordinate, Math.max(first, last - WATCHED * period), period);
   return { amplitude, state, stop: motion.stop, next: ended ? start : next };
 }
 

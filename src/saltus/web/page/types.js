@@ -24,6 +24,8 @@
  * @typedef {Record<string, number>} Numbers
  * @typedef {{time: number, kind: string, contact: string|number, before: ArrayLike<number>, after: ArrayLike<number>}} MotionEvent
  *
+ * @typedef {{first: Record<string, number|null>, share: Numbers}} Validity
+ *
  * @typedef {object} Motion
  * @property {{first: number, last: number}} time
  * @property {string} stop
@@ -33,13 +35,14 @@
  * @property {MotionEvent[]} events
  * @property {(t: number) => number|null} [energy]
  * @property {(t: number) => Numbers|null} [margins]
- * @property {{first: Record<string, number|null>, share: Numbers}|null} [validity]
+ * @property {Validity|null} [validity]  Found when it is asked for; `checked` is it once it has been found.
+ * @property {Validity|null} [checked]
  *
  * @typedef {{period: number|null, values?: Numbers}} EngineSystem
  * @typedef {{kind: string, points: number[][], radius?: number, role: string}} Shape
  * @typedef {object} Engine
  * @property {(values: Numbers) => EngineSystem} system  Throws a refusal `{where, message}`.
- * @property {(system: EngineSystem, start: Numbers, duration: number, options?: {tolerance?: number}) => Motion} simulate
+ * @property {(system: EngineSystem, start: Numbers, duration: number, options?: {tolerance?: number, periods?: number}) => Motion} simulate
  * @property {(system: EngineSystem, state: ArrayLike<number>, time: number) => Shape[]|null} [drawing]
  * @property {(system: EngineSystem, channel: string, time: number) => number} [load]
  *

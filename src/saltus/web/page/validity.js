@@ -47,8 +47,9 @@ export function validityNow(session, time) {
 export function validityOfAll(session) {
   const { motion } = session;
   if (!motion) return "";
-  const parts = Object.entries(motion.validity?.first ?? {}).map(([name, time]) => {
-    const share = motion.validity?.share[name] ?? 0;
+  const known = motion.checked === undefined ? motion.validity : motion.checked;
+  const parts = Object.entries(known?.first ?? {}).map(([name, time]) => {
+    const share = known?.share[name] ?? 0;
     const words = name.replace(/_/g, " ");
     return time === null ? `${words} respected` : `${words} passed first at ${shortly(time)}, ${shortly(100 * share, 3)} % of the time`;
   });
