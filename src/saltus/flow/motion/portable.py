@@ -94,7 +94,7 @@ class PortableMotion:
 
     @cached_property
     def _evaluated(self) -> tuple[Trace, tuple[str, ...], bool]:
-        """A trace with what a page can compute along a motion, the names of it all, and whether the kinetic energy is the last."""
+        """A trace with what a page can compute along motions, its names, and whether the last of them is the kinetic energy."""
         names = self.system.model.margin_names(self.system.load)
         for chosen, energy in ((names, True), (names, False), ((), True)):
             try:
