@@ -20,6 +20,7 @@ def report(results: dict[str, Any]) -> str:
         "![time against error, and throughput](benchmarks.png)",
         _throughput(results["throughput"]),
         _derivatives(results["derivatives"]),
+        _fits(results.get("fits")),
         _startup(results["startup"]),
         _paper_way(results["paper_way"], work),
         _zeno(results["zeno"]),
@@ -100,6 +101,22 @@ def _derivatives(rows: list[dict[str, Any]]) -> str:
     ]  # fmt: skip
     return "## Derivatives, at tol 1e-10 on one core\n\n" + table(
         ("code", "without, us", "with, us", "ratio", "relative error of d(end)/dH", "derivatives to"), cells
+    )
+
+
+def _fits(rows: list[dict[str, Any]] | None) -> str:
+    if not rows:
+        return ""
+    head = ("unknowns", "saltus.fit, ms", "two-point differences, ms", "ratio", "standard errors missed", "and by differences")
+    cells = [
+        [str(row["unknowns"]), *(number(row[name]) for name in ("exact", "differences", "ratio"))]
+        + [f"{row[name]:.0e}" for name in ("missed", "missed_by_differences")]
+        for row in rows
+    ]
+    return (
+        "## A fit with exact derivatives, on one core\n\nFrom 300 noisy samples of 12 units of time, from a guess 3 % off. SciPy's "
+        "`least_squares` with two-point differences of `simulate` ends at the loosest of its tolerances with which it misses the "
+        "least squares by less than 1e-5 standard errors.\n\n" + table(head, cells)
     )
 
 

@@ -22,6 +22,7 @@ from plot import draw
 from report import report
 from siconos import beside_siconos
 from tasks.derivatives import derivative_cost
+from tasks.fitting import fits
 from tasks.process import run_child
 from tasks.smoothed import paper_way
 from tasks.startup import startup
@@ -42,6 +43,7 @@ def measure(peers: list[Peer], rounds: int, quick: bool) -> dict[str, Any]:
         "work": lambda: work_precision(peers, rounds, quick),
         "throughput": lambda: throughput(peers, min(rounds, 3), quick),
         "derivatives": lambda: derivative_cost(peers, rounds),
+        "fits": lambda: fits(rounds),
         "startup": lambda: startup(
             [p for p in peers if not quick or p.module != "saltus_scalar"], 1 if quick else min(rounds, 3)
         ),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -162,6 +162,14 @@ class Fit(Result):
         return {name: f"{value:.9g} +- {self.errors[name]:.2g}" for name, value in self.values.items()}
 
 
+class _FoundError(Exception):
+    """Ends SciPy's search where chi^2 cannot fall by more than its rounding, which SciPy tries for half of all its steps."""
+
+    def __init__(self, chi2: float, x: np.ndarray) -> None:
+        super().__init__()
+        self.chi2, self.x = chi2, x
+
+
 @dataclass(frozen=True)
 class _Search:
     """The unknowns of a fit: names, first values, bounds, and the measurements."""
@@ -171,26 +179,27 @@ class _Search:
     first: np.ndarray
     low: np.ndarray
     high: np.ndarray
+    last: dict[Any, list[Compared]] = field(default_factory=dict)
 
     def compared(self, x: np.ndarray, until: Sequence[float]) -> list[Compared]:
-        """The motions with these values beside all measurements, each up to a time."""
-        values = dict(zip(self.names, x.tolist(), strict=True))
-        return [self.problem.beside(i, values, end) for i, end in enumerate(until)]
+        """The motions with these values beside all measurements, each up to a time; the last answer is remembered."""
+        asked = (x.tobytes(), tuple(until))
+        if asked not in self.last:
+            values = dict(zip(self.names, x.tolist(), strict=True))
+            found = [self.problem.beside(i, values, end) for i, end in enumerate(until)]
+            self.last.clear()
+            self.last[asked] = found
+        return self.last[asked]
 
     def solved(self, x: np.ndarray, until: Sequence[float]) -> tuple[float, np.ndarray]:
         """The least squares from a start: chi^2 and the values; inf where the motion from the start cannot be followed."""
         from scipy.optimize import least_squares
 
-        seen: dict[bytes, list[Compared] | None] = {}
-
         def beside(x: np.ndarray) -> list[Compared] | None:
-            if x.tobytes() not in seen:
-                seen.clear()
-                try:
-                    seen[x.tobytes()] = self.compared(x, until)
-                except SaltusError:  # no such system, or no such motion: the step becomes shorter
-                    seen[x.tobytes()] = None
-            return seen[x.tobytes()]
+            try:
+                return self.compared(x, until)
+            except SaltusError:  # no such system, or no such motion: the step becomes shorter
+                return None
 
         begun = beside(x)
         if begun is None:
@@ -204,14 +213,29 @@ class _Search:
         def jacobian(x: np.ndarray) -> np.ndarray:
             parts = beside(x)
             assert parts is not None
-            return _stacked(parts)[1]
+            r, slopes, _ = _stacked(parts)
+            if self._gain(x, r, slopes) < tight * float(r @ r):
+                raise _FoundError(float(r @ r), x)
+            return slopes
 
         tight = 4 * np.finfo(float).eps
         x = np.clip(x, np.nextafter(self.low, np.inf), np.nextafter(self.high, -np.inf))
-        found = least_squares(
-            residuals, x, jacobian, bounds=(self.low, self.high), x_scale="jac", xtol=1e-12, ftol=tight, gtol=tight
-        )
+        try:
+            found = least_squares(
+                residuals, x, jacobian, bounds=(self.low, self.high), x_scale="jac", xtol=1e-12, ftol=tight, gtol=tight
+            )
+        except _FoundError as end:
+            return end.chi2, end.x
         return 2.0 * float(found.cost), np.asarray(found.x)
+
+    def _gain(self, x: np.ndarray, r: np.ndarray, jacobian: np.ndarray) -> float:
+        """By how much chi^2 falls in a full step of Gauss and Newton; numbers on their bounds stay there."""
+        gradient, near = r @ jacobian, 1e-6 * (self.high - self.low)
+        with np.errstate(invalid="ignore"):  # without bounds
+            held = ((x - self.low < near) & (gradient > 0)) | ((self.high - x < near) & (gradient < 0))
+        sizes = np.where(held, 0.0, np.linalg.norm(jacobian, axis=0))
+        slopes, scaled = jacobian[:, sizes > 0] / sizes[sizes > 0], gradient[sizes > 0] / sizes[sizes > 0]
+        return float(scaled @ np.linalg.lstsq(slopes.T @ slopes, scaled, rcond=None)[0])
 
 
 def _check(
@@ -405,7 +429,7 @@ def _result(search: _Search, x: np.ndarray, size: float) -> Fit:
     noise = 1.0 if _noise_known(search) else math.sqrt(size / max(degrees, 1))
     width = search.high - search.low
     scale = np.where(np.isfinite(width), width, np.maximum(np.abs(x), 1.0))
-    _, singular, rows = np.linalg.svd(jacobian * scale, full_matrices=True)
+    _, singular, rows = np.linalg.svd(np.linalg.qr(jacobian * scale, mode="r"))
     singular = np.append(singular, np.zeros(len(rows) - singular.size))
     with np.errstate(divide="ignore"):
         errors = noise / singular  # along each direction, as a share of the bounds

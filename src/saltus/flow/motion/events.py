@@ -151,7 +151,7 @@ class MotionEvents(RowTable, Sequence[Event]):
         return self._of_kinds(kind)
 
     def _of_kinds(self, *kinds: EventKind) -> Self:
-        return self._only(np.isin(self._labels[:, 1], [EVENT_KINDS.index(kind) for kind in kinds]))
+        return self._only(np.any([self._labels[:, 1] == EVENT_KINDS.index(kind) for kind in kinds], axis=0))
 
     @property
     def codes(self) -> np.ndarray:

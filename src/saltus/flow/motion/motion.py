@@ -181,7 +181,8 @@ class Motion(Result):
             return (float(position[0]), float(velocity[0])) if position.ndim == 1 else (position[:, 0], velocity[:, 0])
         return position, velocity
 
-    def _states(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _check_times(self, times: np.ndarray) -> None:
+        """Refuse times of which the motion has no states."""
         if self.dense is None and self.time > self.start:
             raise ParameterError(
                 "this motion was not kept densely: only its end, its events and what it `kept` are known", "times"
@@ -189,6 +190,9 @@ class Motion(Result):
         slack = 1e-12 * max(1.0, abs(self.time))
         if times.size and not (times.min() >= self.start - slack and times.max() <= self.time + slack):
             raise ParameterError(f"times must lie in [{self.start:g}, {self.time:g}], the span of the motion", "times")
+
+    def _states(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        self._check_times(times)
         if self.dense is None:
             position, velocity = np.atleast_1d(self.position), np.atleast_1d(self.velocity)
             tile = np.ones(times.size)

@@ -122,7 +122,7 @@ class Sensitivities(Result):
         (2, 2, 3)
         """
         wanted, motion = instants(times), self.motion
-        motion._states(wanted)  # refuses what it has no states of
+        motion._check_times(wanted)
         found = np.broadcast_to(self.at_end, (wanted.size, *self.at_end.shape)).copy()
         inner = wanted < motion.time
         if inner.any():

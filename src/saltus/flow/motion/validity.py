@@ -35,11 +35,12 @@ class DenseOutput:
     def states(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Coordinates and velocities, each (degrees of freedom, n), and sides (n,); at an impact, those after it."""
         step = np.clip(np.searchsorted(self.start, times, side="right") - 1, 0, None)
-        tau = times - self.start[step]
-        powers = np.arange(self.series.shape[2])
-        coefficients = self.series[step]
-        slopes = coefficients[:, :, 1:] * powers[1:]
-        return evaluate(coefficients, tau), evaluate(slopes, tau), self.side[step]
+        tau, rows = times - self.start[step], np.ascontiguousarray(self.series[step].transpose(2, 1, 0))  # of one power each
+        value, slope = rows[-1], np.zeros_like(rows[-1])
+        for row in rows[-2::-1]:  # Horner's scheme, differentiated
+            slope = slope * tau + value
+            value = value * tau + row
+        return value, slope, self.side[step]
 
     def accelerations(self, times: np.ndarray) -> np.ndarray:
         """The second derivatives of the coordinates, (degrees of freedom, n)."""
