@@ -256,6 +256,8 @@ def good(made):
         "System.from_dict": (saltus.System.from_dict, {"data": SYSTEM.to_dict()}),
         "System.from_json": (saltus.System.from_json, {"text": SYSTEM.to_json()}),
         "System.from_toml": (saltus.System.from_toml, {"text": SYSTEM.to_toml()}),
+        "System.from_gaps": (SYSTEM.from_gaps, {"time": 0.0, "position": [0.3], "velocity": [0.1]}),
+        "System.to_gaps": (SYSTEM.to_gaps, {"time": 0.0, "position": [0.3], "velocity": [0.1]}),
         "System.get": (SYSTEM.get, {"path": "load.frequency"}),
         "System.with_": (SYSTEM.with_, {"changes": {"load.frequency": 1.1}}),
         "TwoLayer": (saltus.TwoLayer, {"beta0": 1.4}),

@@ -23,12 +23,17 @@ class Contact:
 
     While it is closed, q stays at p. Its reaction, the impulse or force on q times the sign, is not negative.
 
+    Between bodies q is a sum of coordinates with constant coefficients, such as the distance y - x, and its reaction acts on each
+    of them with its coefficient. A channel of the load that displaces the ground may be one of them: a wall that moves, or a
+    table that shakes, q = x - zeta(t).
+
     Parameters
     ----------
     name
         Its name, such as "lower", in events and in the names of stops.
     coordinate
-        The name of the model's coordinate.
+        The name of the model's coordinate; or a dictionary of the coefficients of several, {"y": 1.0, "x": -1.0} for y - x, and
+        of load channels whose names begin with "ground".
     sign
         +1 where the coordinate stays above the position, -1 where it stays below.
     position
@@ -43,10 +48,11 @@ class Contact:
     >>> right = saltus.Contact(name="right", coordinate="x", position=1.0, sign=-1)
     >>> right.gap(0.25)
     0.75
+    >>> between = saltus.Contact(name="between", coordinate={"y": 1.0, "x": -1.0}, position=0.2)  # y - x >= 0.2
     """
 
     name: str
-    coordinate: str
+    coordinate: Any
     sign: int = 1
     position: Any = 0.0
     group: str = ""
@@ -124,8 +130,8 @@ class ContactModel(Model):
 
     1. `force`, r(t, q, v); its accelerations follow from it;
     2. `mass_matrix`, M(q), symmetric and positive definite, where that is not the identity;
-    3. `contacts`, a tuple of `Contact`, each of which keeps one coordinate on one side of a position. While a contact is closed
-       it holds its coordinate as long as its reaction presses; impacts follow the system's law (`NewtonImpact`);
+    3. `contacts`, a tuple of `Contact`, each of which keeps one coordinate, or a sum of several, on one side of a position. While
+       a contact is closed it holds it as long as its reaction presses; impacts follow the system's law (`NewtonImpact`);
     4. `frictions`, a tuple of `Friction`, and their `normal_forces` N(t, q, v), by default 1. A friction that sticks holds the
        velocity of its coordinate. M(q) may connect no coordinate with a friction to one with a contact;
     5. optionally `transfers` (whether an impact passes speed on to the other contacts of its group, as a crossing does) and
@@ -227,50 +233,6 @@ class ContactModel(Model):
         return (1.0,) * len(self.frictions)
 
 
-def check_contact_model(model: ContactModel) -> None:
-    """Refuse contacts and frictions that have no meaning.
-
-    Raises
-    ------
-    ParameterError
-        Sides; too many parts or two of one name; an unknown coordinate, or one that two parts hold; two contacts that leave it no
-        room; a coefficient of friction below 0; mu_s < mu_k.
-    """
-    contacts, frictions, kind = model.contacts, model.frictions, type(model).__name__
-    if model.sides:
-        raise ParameterError(f"{kind} is a ContactModel, so it has no sides: leave them out", "model")
-    for what, count, most in (("contacts", len(contacts), MOST_CONTACTS), ("frictions", len(frictions), MOST_FRICTIONS)):
-        if count > most:
-            raise ParameterError(f"{kind} has {count} {what}, and at most {most} can be followed", "model")
-    names = [*(contact.name for contact in contacts), *(friction.name for friction in frictions)]
-    if len(set(names)) < len(names):
-        raise ParameterError(f"contacts and frictions of {kind} must have names of their own, got {', '.join(names)}", "model")
-    for contact in contacts:
-        if contact.coordinate not in model.coordinates:
-            known = ", ".join(model.coordinates)
-            raise ParameterError(f"the contact {contact.name!r} holds {contact.coordinate!r}, but {kind} has {known}", "model")
-    for a in contacts:
-        for b in contacts:
-            if a is not b and a.coordinate == b.coordinate and not (a.sign != b.sign and b.gap(a.position) > 0.0):
-                raise ParameterError(f"the contacts {a.name!r} and {b.name!r} leave {a.coordinate} no room between them", "model")
-    _check_frictions(model)
-
-
-def _check_frictions(model: ContactModel) -> None:
-    """Refuse frictions on coordinates that they cannot hold, or with coefficients without meaning."""
-    kind, taken = type(model).__name__, [contact.coordinate for contact in model.contacts]
-    for friction in model.frictions:
-        where = f"the friction {friction.name!r} of {kind}"
-        if friction.coordinate not in model.coordinates:
-            raise ParameterError(f"{where} holds {friction.coordinate!r}, none of {', '.join(model.coordinates)}", "model")
-        if friction.coordinate in taken:
-            raise ParameterError(f"{where} and something else hold {friction.coordinate}: take two coordinates", "model")
-        if not 0.0 <= float(friction.kinetic) <= float(friction.most):
-            pair = f"kinetic = {float(friction.kinetic):g} and static = {float(friction.most):g}"
-            raise ParameterError(f"{where} must have 0 <= kinetic <= static, got {pair}", "model")
-        taken.append(friction.coordinate)
-
-
 def constrained_acceleration(
     model: Model, t: Any, q: Any, v: Any, load: Any, free: Sequence[Any], slides: Sequence[Any] = ()
 ) -> list[Any]:
@@ -290,7 +252,7 @@ def constrained_acceleration(
     right = [free[i] * force[i] for i in range(size)]
     for k in range(size):
         for i in range(k + 1, size):
-            if _is_zero(matrix[i][k]):
+            if is_zero(matrix[i][k]):
                 continue
             factor = matrix[i][k] / matrix[k][k]
             for j in range(k + 1, size):
@@ -300,7 +262,7 @@ def constrained_acceleration(
     for i in reversed(range(size)):
         value = right[i]
         for j in range(i + 1, size):
-            if not _is_zero(matrix[i][j]):
+            if not is_zero(matrix[i][j]):
                 value = value - matrix[i][j] * solved[j]
         solved[i] = value / matrix[i][i]
     return solved
@@ -339,14 +301,14 @@ def normal_forces(model: Any, t: Any, q: Any, v: Any, load: Any) -> tuple[Any, .
 def _lacking(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any) -> list[Any]:
     """M a - r, the force that must act on each coordinate besides r for these accelerations."""
     mass, force = mass_and_force(model, t, q, v, load)
-    return [sum(m * x for m, x in zip(row, a, strict=True) if not _is_zero(m)) - r for row, r in zip(mass, force, strict=True)]
+    return [sum(m * x for m, x in zip(row, a, strict=True) if not is_zero(m)) - r for row, r in zip(mass, force, strict=True)]
 
 
 def apart(model: Model, mass: Sequence[Sequence[Any]]) -> bool:
     """Whether the mass matrix connects no coordinate with a contact to one with a friction, whatever the state."""
     names, near = model.coordinates, {contact.coordinate for contact in model.contacts}
     for _ in names:
-        near |= {b for a in near for b in names if not _is_zero(mass[names.index(a)][names.index(b)])}
+        near |= {b for a in near for b in names if not is_zero(mass[names.index(a)][names.index(b)])}
     return not any(friction.coordinate in near for friction in model.frictions)
 
 
@@ -361,10 +323,10 @@ def mass_and_force(model: Any, t: Any, q: Any, v: Any, load: Any) -> tuple[list[
 def _held(entry: Any, i: int, j: int, free: Sequence[Any]) -> Any:
     """An entry of D M D + 1 - D."""
     if i != j:
-        return 0.0 if _is_zero(entry) else free[i] * free[j] * entry
+        return 0.0 if is_zero(entry) else free[i] * free[j] * entry
     return 1.0 if isinstance(entry, float) and entry == 1.0 else free[i] * entry + (1.0 - free[i])
 
 
-def _is_zero(entry: Any) -> bool:
+def is_zero(entry: Any) -> bool:
     """Whether an entry is 0 for every state: the number 0, and not a symbol or an array."""
     return isinstance(entry, (int, float)) and entry == 0

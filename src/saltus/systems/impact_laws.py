@@ -11,6 +11,7 @@ from saltus.checks import check_number, settle_numbers
 from saltus.errors import ParameterError
 from saltus.public_functions import answered
 from saltus.systems.contact_model import Contact, ContactModel
+from saltus.systems.gap_coordinates import in_gap_coordinates
 from saltus.systems.load import Load
 from saltus.systems.model import Model, OneContactModel
 
@@ -264,7 +265,7 @@ def energy_gain(model: ContactModel, impact: ImpactLaw) -> dict[str, float]:
     >>> saltus.energy_gain(heavy, saltus.NewtonImpact(transfer=1.0))["upper"]  # the lower mass is heavier by that share
     0.7
     """
-    return {name: float(share) for name, share in energy_gains(model, impact).items()}
+    return {name: float(share) for name, share in energy_gains(in_gap_coordinates(model), impact).items()}
 
 
 def energy_gains(model: Any, impact: Any, shape: tuple[int, ...] = ()) -> dict[str, np.ndarray]:

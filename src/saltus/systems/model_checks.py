@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import inspect
 import math
+from collections.abc import Mapping
 from types import FunctionType
 from typing import Any
 
 import numpy as np
 
 from saltus.errors import ParameterError, SaltusError, shown
-from saltus.systems.contact_model import ContactModel, check_contact_model
+from saltus.systems.contact_model import MOST_CONTACTS, MOST_FRICTIONS, Contact, ContactModel
+from saltus.systems.gap_coordinates import InGapCoordinates
 from saltus.systems.impact_laws import ImpactLaw
 from saltus.systems.load import DeclaredLoad, Load
 from saltus.systems.model import Model, OneContactModel, check_one_contact
@@ -38,6 +40,8 @@ def check_works(model: Model) -> None:
         check_one_contact(model)
     if isinstance(model, ContactModel):
         check_contact_model(model)
+    if isinstance(model, InGapCoordinates):
+        _check_moving_walls(model)
     if type(model) not in _known:
         _probe(model)
         _known.add(type(model))
@@ -108,6 +112,91 @@ def check_contact(model: OneContactModel, impact: ImpactLaw) -> None:
                 ),
                 "model",
             )
+
+
+def check_contact_model(model: ContactModel) -> None:
+    """Refuse contacts and frictions that have no meaning.
+
+    Raises
+    ------
+    ParameterError
+        Sides; too many parts or two of one name; an unknown coordinate, or one that two parts hold; a sum of coordinates without
+        meaning; two contacts that leave no room; a coefficient of friction below 0; mu_s < mu_k.
+    """
+    contacts, frictions, kind = model.contacts, model.frictions, type(model).__name__
+    if model.sides:
+        raise ParameterError(f"{kind} is a ContactModel, so it has no sides: leave them out", "model")
+    for what, count, most in (("contacts", len(contacts), MOST_CONTACTS), ("frictions", len(frictions), MOST_FRICTIONS)):
+        if count > most:
+            raise ParameterError(f"{kind} has {count} {what}, and at most {most} can be followed", "model")
+    names = [*(contact.name for contact in contacts), *(friction.name for friction in frictions)]
+    if len(set(names)) < len(names):
+        raise ParameterError(f"contacts and frictions of {kind} must have names of their own, got {', '.join(names)}", "model")
+    for contact in contacts:
+        if isinstance(contact.coordinate, str) and contact.coordinate not in model.coordinates:
+            known = ", ".join(model.coordinates)
+            raise ParameterError(f"the contact {contact.name!r} holds {contact.coordinate!r}, but {kind} has {known}", "model")
+        if not isinstance(contact.coordinate, str):
+            _check_sum(model, contact)
+    for a in contacts:
+        for b in contacts:
+            if a is not b and a.coordinate == b.coordinate and not (a.sign != b.sign and b.gap(a.position) > 0.0):
+                raise ParameterError(f"the contacts {a.name!r} and {b.name!r} leave {a.coordinate} no room between them", "model")
+    _check_frictions(model)
+
+
+def _check_frictions(model: ContactModel) -> None:
+    """Refuse frictions on coordinates that they cannot hold, or with coefficients without meaning."""
+    kind, taken = type(model).__name__, [contact.coordinate for contact in model.contacts]
+    for friction in model.frictions:
+        where = f"the friction {friction.name!r} of {kind}"
+        if friction.coordinate not in model.coordinates:
+            raise ParameterError(f"{where} holds {friction.coordinate!r}, none of {', '.join(model.coordinates)}", "model")
+        if friction.coordinate in taken:
+            raise ParameterError(f"{where} and something else hold {friction.coordinate}: take two coordinates", "model")
+        if not 0.0 <= float(friction.kinetic) <= float(friction.most):
+            pair = f"kinetic = {float(friction.kinetic):g} and static = {float(friction.most):g}"
+            raise ParameterError(f"{where} must have 0 <= kinetic <= static, got {pair}", "model")
+        taken.append(friction.coordinate)
+
+
+def _check_sum(model: ContactModel, contact: Contact) -> None:
+    """Refuse a sum of coordinates and displacements of the ground that a contact cannot keep on one side."""
+    where, names, given = f"the contact {contact.name!r} of {type(model).__name__}", model.coordinates, contact.coordinate
+    if not isinstance(given, Mapping) or not given:
+        raise ParameterError(
+            f"{where} must hold a coordinate, or a dictionary such as {{'y': 1.0, 'x': -1.0}}, got {shown(given)}", "model"
+        )
+    grounds = [channel for channel in model.channels if channel.startswith("ground")]
+    for name, factor in given.items():
+        if name not in (*names, *grounds):
+            known = ", ".join((*names, *grounds))
+            reason = " (a wall moves with a channel whose name begins with ground, as those are displacements)"
+            raise ParameterError(
+                f"{where} holds {shown(name)}, none of {known}{reason if name in model.channels else ''}", "model"
+            )
+        if not (isinstance(factor, (int, float)) and math.isfinite(factor) and factor != 0.0):
+            raise ParameterError(
+                f"{where} must have coefficients that are numbers other than 0, got {shown(factor)} of {name}", "model"
+            )
+    if not any(name in names for name in given):
+        raise ParameterError(f"{where} holds {', '.join(given)} and no coordinate of {', '.join(names)}", "model")
+    if type(model).acceleration is not ContactModel.acceleration:
+        raise ParameterError(
+            f"{where} holds a sum of coordinates, so {type(model).__name__} must define force, not acceleration", "model"
+        )
+
+
+def _check_moving_walls(model: InGapCoordinates) -> None:
+    """Refuse a mass matrix that depends on the coordinates of a model with walls that move, which are functions of the time."""
+    size = len(model.coordinates)
+    one, other = (model.mass_matrix(q if size == 1 else (q,) * size) for q in PROBE[1:])
+    if any(model.sums()[1]) and not np.array_equal(one, other):
+        raise ParameterError(
+            f"the mass matrix of {model.own_class.__name__} depends on its coordinates, and a contact moves with the ground, "
+            "which is not followed: choose coordinates relative to the ground, whose acceleration then is a force",
+            "model",
+        )
 
 
 def _probe(model: Model) -> None:

@@ -13,6 +13,7 @@ from importlib import import_module
 from typing import Any, TypeVar
 
 from saltus.errors import ParameterError, near, shown
+from saltus.systems.gap_coordinates import IN_GAPS, in_gap_coordinates
 from saltus.systems.impact_laws import Factors, ImpactLaw
 from saltus.systems.load import Load
 from saltus.systems.model import Model, OneContactModel, check_one_contact
@@ -206,7 +207,8 @@ def from_dict(kind: str, data: Any) -> Any:
     name = fields.pop("type")
     if not isinstance(name, str):
         raise ParameterError(f"{kind}.type must be a name in quotes, got {shown(name)}", f"{kind}.type")
-    return build(find(kind, name), fields, kind)
+    made = build(find(kind, name.removesuffix(IN_GAPS)), fields, kind)
+    return in_gap_coordinates(made) if name.endswith(IN_GAPS) else made
 
 
 def read_signal(data: Any, where: str) -> Any:

@@ -11,15 +11,19 @@ import numpy as np
 
 from saltus.checks import LIMITS, as_numbers, check_number
 from saltus.errors import ParameterError, near, shown
+from saltus.systems.gap_coordinates import CLOSED_BELOW, InGapCoordinates
 from saltus.systems.model import Model
 from saltus.systems.system import System
 
 
-def read_start(system: System, velocity: Any, coordinates: Mapping[str, Any], arguments: Iterable[str] = ()) -> np.ndarray:
+def read_start(
+    system: System, velocity: Any, coordinates: Mapping[str, Any], arguments: Iterable[str] = (), time: float = 0.0
+) -> np.ndarray:
     """A state, coordinates and then velocities, (d,), from `theta=0.3, velocity=0.1` as `simulate` takes them.
 
     Every coordinate must be given, by its name; those called theta_1, theta_2, ... may be given together, `theta=(0.3, 0.0)`. The
-    velocity is a number with one coordinate, or as many numbers as there are coordinates; 0, the default, is 0 for all.
+    velocity is a number with one coordinate, or as many numbers as there are coordinates; 0, the default, is 0 for all. For a
+    system in coordinates of its gaps the coordinates of the model as it was given may be named instead, all of them.
 
     Parameters
     ----------
@@ -29,12 +33,17 @@ def read_start(system: System, velocity: Any, coordinates: Mapping[str, Any], ar
         The state at the start.
     arguments
         The names of the other arguments of the function that reads it: a misspelt one arrives among the coordinates.
+    time
+        The time at the start.
 
     Raises
     ------
     ParameterError
         A name is no coordinate (the message has similar names), a coordinate is not given, or a value is no finite number.
     """
+    if isinstance(system.model, InGapCoordinates) and not coordinates.keys() & set(system.model.coordinates):
+        own = system.with_(model=system.model.as_given())
+        return np.concatenate(own.to_gaps(time, *np.split(read_start(own, velocity, coordinates, arguments), 2)))
     names = system.model.coordinates
     positions = _positions(system, coordinates, arguments)
     speeds = (velocity,) if len(names) == 1 and not _is_sequence(velocity) else _speeds(velocity, len(names))
@@ -185,9 +194,6 @@ def _default_window(system: System) -> Window:
         pair[:] = sorted((at, at + contact.sign * HALF_WIDTH)) if alone else pair
         pair[contact.sign < 0] = at
     return Window([*((low, high) for low, high in bounds.values()), *[(-HALF_WIDTH, HALF_WIDTH)] * len(bounds)])
-
-
-CLOSED_BELOW = 1e-13  # A contact is closed, up to rounding, if both its gap and its speed are smaller than this.
 
 
 @cache

@@ -13,6 +13,7 @@ from saltus.errors import ParameterError, near, shown
 from saltus.files import parsed_json
 from saltus.notebook import html_table
 from saltus.systems.contact_model import ContactModel, normal_forces
+from saltus.systems.gap_coordinates import in_gap_coordinates
 from saltus.systems.impact_laws import ImpactLaw, VelocityReduction
 from saltus.systems.load import Load
 from saltus.systems.model import Model, OneContactModel
@@ -67,6 +68,7 @@ class System:
         self.model.check_load(self.load)
         check_works(self.model)
         _check_impact(self.model, self.impact)
+        _ = self.in_gap_coordinates  # refuses gaps that cannot be coordinates
 
     def _repr_html_(self) -> str:
         parts = {name: type(getattr(self, name)).__name__ for name in ("model", "impact")}
@@ -123,6 +125,46 @@ class System:
         """Every number of the system by its dotted path."""
         return dict(numbers(self))
 
+    @property
+    def in_gap_coordinates(self) -> System:
+        """This system in coordinates of which each contact of its model holds one; itself, if each does already.
+
+        A sum of coordinates that a contact keeps on one side then is a coordinate, in the place of one of its terms: y_minus_x in
+        the place of y. All other numbers are the same, under the same paths.
+        """
+        model = in_gap_coordinates(self.model)
+        return self if model is self.model else System(model=model, load=self.load, impact=self.impact)
+
+    def from_gaps(self, time: Any, position: Any, velocity: Any) -> tuple[Any, Any]:
+        """Coordinates and velocities of this system, for those of `in_gap_coordinates`; the same objects where that is itself.
+
+        Parameters
+        ----------
+        time
+            The dimensionless time, a number or an array (n,).
+        position, velocity
+            A number or an array (n,) for each coordinate.
+        """
+        model = in_gap_coordinates(self.model)
+        if model is self.model:
+            return position, velocity
+        return model.own_states(time, position, velocity, self.load)  # type: ignore[no-any-return]
+
+    def to_gaps(self, time: Any, position: Any, velocity: Any) -> tuple[Any, Any]:
+        """The inverse of `from_gaps`. Gaps of closed contacts, and their rates, are 0 if they are so up to rounding.
+
+        Parameters
+        ----------
+        time
+            The dimensionless time, a number or an array (n,).
+        position, velocity
+            A number or an array (n,) for each coordinate.
+        """
+        model = in_gap_coordinates(self.model)
+        if model is self.model:
+            return position, velocity
+        return model.gap_states(time, position, velocity, self.load)  # type: ignore[no-any-return]
+
     def mirrored(self) -> System | None:
         """The system in which -theta(t) is a motion wherever theta(t) is one in this system; None without the symmetry.
 
@@ -134,7 +176,9 @@ class System:
         ParameterError
             A `mirror` of the model that is no such symmetry, as a test at one state shows.
         """
-        load = self.model.mirror(self.load)
+        load, inner = self.model.mirror(self.load), self.in_gap_coordinates
+        if inner is not self:
+            return None if inner.mirrored() is None else System(model=self.model, load=load, impact=self.impact)
         if load is None or contact_images(self.model, self.impact) is None:
             return None
         mirrored = System(model=self.model, load=load, impact=self.impact)
@@ -271,8 +315,17 @@ def _parsed(text: str, parse: Callable[[str], Any], language: str) -> Any:
         raise ParameterError(f"this is not the {language} of a system: {error!s:.120}", "text") from None
 
 
-def check_system(system: Any, asking: str, *, coordinates: int | None = None, several_contacts: bool = False) -> None:
+def check_system(
+    system: Any,
+    asking: str,
+    *,
+    coordinates: int | None = None,
+    several_contacts: bool = False,
+    own_coordinates: bool = False,
+) -> None:
     """Refuse anything but a System whose model has the contacts and the number of coordinates that `asking` is for.
+
+    If `own_coordinates`, contacts of the model may keep sums of coordinates.
 
     Raises
     ------
@@ -281,7 +334,13 @@ def check_system(system: Any, asking: str, *, coordinates: int | None = None, se
     """
     if not isinstance(system, System):
         raise ParameterError(f"{asking} takes a System(model=..., load=..., impact=...), got {shown(system)}", "system")
-    names = system.model.coordinates
+    inner, names = system.in_gap_coordinates, system.model.coordinates
+    if inner is not system and not own_coordinates:
+        raise ParameterError(
+            f"{asking} works in coordinates that contacts hold one by one: give it system.in_gap_coordinates, which has "
+            f"{', '.join(inner.model.coordinates)}",
+            "system",
+        )
     if coordinates is not None and len(names) != coordinates:
         wanted = "one coordinate" if coordinates == 1 else f"{coordinates} coordinates"
         raise ParameterError(f"{asking} is for models with {wanted}, and this one has {', '.join(names)}", "system")

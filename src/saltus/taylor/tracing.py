@@ -210,7 +210,7 @@ def trace(
     paths = None if sensitivities is None else check_paths(system, sensitivities)
     sides = system.model.sides
     result = Trace(model=type(system.model).__name__, side_count=len(sides), dof=len(system.model.coordinates))
-    twin = substitute_numbers(system, result.symbol)
+    twin = substitute_numbers(system.in_gap_coordinates, result.symbol)
     _name_records(twin.load)
     object.__setattr__(twin, "load", DeclaredLoad(twin.load, twin.model))
     model, load, t, dof = twin.model, twin.load, LoadTime(result), result.dof

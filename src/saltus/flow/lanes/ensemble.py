@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from saltus.checks import check_memory, check_number, check_work
+from saltus.errors import ParameterError
 from saltus.flow.kernel.compiled import Program, limits_of, program
 from saltus.flow.kernel.layout import Mode, Status
 from saltus.flow.lanes.capture_speeds import capture_speeds
 from saltus.flow.lanes.compiled_lanes import compile_beside, compile_driver_aside, compile_everything, load_lane_functions
 from saltus.flow.lanes.ensemble_dataset import to_dataset
 from saltus.flow.lanes.ensemble_result import EnsembleResult
-from saltus.flow.lanes.inputs import Inputs, read_inputs
+from saltus.flow.lanes.inputs import Inputs, inputs_in_gaps, read_inputs
 from saltus.flow.lanes.memory import JOB
 from saltus.flow.lanes.options import EnsembleOptions, Sample, Until, read_last, read_names, read_side, read_threads
 from saltus.flow.lanes.threads import Jobs, Lanes
@@ -96,7 +98,7 @@ def simulate_many(
     >>> ends.impact_count.values, float(ends.theta[2])
     (array([39, 39, 39]), -0.23568059529931645)
     """
-    check_system(system, "simulate_many", several_contacts=True)
+    check_system(system, "simulate_many", several_contacts=True, own_coordinates=True)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     options = EnsembleOptions(
         tol=tol,
@@ -107,8 +109,16 @@ def simulate_many(
         paths=None if sensitivities is None else read_names("sensitivities", sensitivities),
     )
     side, threads = read_side(side), read_threads(threads)
-    inputs = read_inputs(system, velocity, time, parameters, coordinates)
-    return to_dataset(run_ensemble(system, inputs, options, threads, progress, duration=duration, side=side, last=last))
+    inputs, inner = read_inputs(system, velocity, time, parameters, coordinates), system.in_gap_coordinates
+    if inner is not system and (Sample.EXTREMA in options.sample or options.paths is not None):
+        raise ParameterError(
+            "extrema and derivatives of many motions are those of coordinates that contacts hold one by one: give "
+            f"system.in_gap_coordinates, which has {', '.join(inner.model.coordinates)}",
+            "sample",
+        )
+    followed = inputs_in_gaps(system, inputs)
+    result = run_ensemble(inner, followed, options, threads, progress, duration=duration, side=side, last=last)
+    return to_dataset(replace(result, system=system, inputs=inputs))
 
 
 def run_ensemble(

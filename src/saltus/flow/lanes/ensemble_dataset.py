@@ -14,7 +14,7 @@ from saltus.flow.motion.motion import rate_name, state_names
 from saltus.flow.motion.validity import GAIN_ROUNDING
 from saltus.provenance import provenance
 from saltus.public_functions import answered
-from saltus.systems import energy_gains, substitute
+from saltus.systems import energy_gains
 
 if TYPE_CHECKING:
     import xarray
@@ -128,7 +128,7 @@ def _masks(names: list[str]) -> dict[str, Any]:
 
 def _add_gains(writer: _Writer, system: System, inputs: Inputs) -> None:
     """The contacts at which the impact law may gain energy, as in `Validity.gains`."""
-    twin = substitute(system, lambda path, value: inputs.parameters.get(path, value))
+    twin = inputs.with_numbers(system.in_gap_coordinates)
     which = np.zeros(inputs.size, dtype=np.int16)
     gains = energy_gains(twin.model, twin.impact, which.shape)
     for i, gain in enumerate(gains.values()):

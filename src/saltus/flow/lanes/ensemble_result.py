@@ -49,7 +49,15 @@ class EnsembleResult:
     def last(self) -> np.ndarray:
         """The states at the end, coordinates and then velocities, (n, d)."""
         own = len(self.system.model.coordinates)
-        return np.concatenate([self.ends.states[:, :own], self.ends.states[:, self.rows : self.rows + own]], axis=1)
+        states = np.concatenate([self.ends.states[:, :own], self.ends.states[:, self.rows : self.rows + own]], axis=1)
+        return self._in_own_coordinates(self.time, states)
+
+    def _in_own_coordinates(self, times: np.ndarray, states: np.ndarray) -> np.ndarray:
+        """States (n, d) at times (n,) in the coordinates of `system`, from those of `system.in_gap_coordinates`."""
+        if (inner := self.system.in_gap_coordinates) is self.system:
+            return states
+        twin, own = self.inputs.with_numbers(inner), len(inner.model.coordinates)
+        return np.concatenate(twin.model.own_states(times, states[:, :own].T, states[:, own:].T, twin.load)).T
 
     @property
     def held(self) -> np.ndarray:
@@ -118,6 +126,11 @@ class EnsembleResult:
             width = len(kind.columns(len(self.system.model.coordinates)))
             found[kind] = samples[:, :, column : column + width]
             column += width
+        if Sample.STATE in found and self.system.in_gap_coordinates is not self.system:
+            length, begun = self.jobs.rows["period_length"], self.jobs.rows["first_period"]
+            for i, back in enumerate(range(kept - 1, -1, -1)):
+                whole = (begun + done - back) * length + self.jobs.rows["start_time"]
+                found[Sample.STATE][:, i] = self._in_own_coordinates(whole if back else self.time, found[Sample.STATE][:, i])
         return found
 
     @cached_property

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,8 +12,17 @@ import numpy as np
 from saltus.checks import LIMITS, check_memory
 from saltus.errors import ParameterError
 from saltus.flow.lanes.ensemble_dataset import result_names
-from saltus.flow.motion.motion import rate_name
-from saltus.systems import System, broadcast_arrays, check_parameters, finite_array, numbers, parameter_table, read_starts
+from saltus.flow.motion.motion import rate_name, state_names
+from saltus.systems import (
+    System,
+    broadcast_arrays,
+    check_parameters,
+    finite_array,
+    numbers,
+    parameter_table,
+    read_starts,
+    substitute,
+)
 
 ARGUMENTS = (  # of `simulate_many`: a misspelt one arrives among the coordinates
     *("velocity", "parameters", "periods", "duration", "tol", "time", "side", "stop_at", "sample", "last", "until"),
@@ -41,6 +50,10 @@ class Inputs:
         """The parameters that were given, by path."""
         return {path: self.values[path] for path in self.paths}
 
+    def with_numbers(self, system: System) -> Any:
+        """A copy of a system in which the numbers of the parameters are arrays, for what is no simulation."""
+        return substitute(system, lambda path, value: self.parameters.get(path, value))
+
 
 def read_inputs(system: System, velocity: Any, time: Any, parameters: Any, coordinates: Mapping[str, Any]) -> Inputs:
     """Broadcast and check the arguments of an ensemble.
@@ -59,6 +72,17 @@ def read_inputs(system: System, velocity: Any, time: Any, parameters: Any, coord
     size = math.prod(shape)
     check_memory(dims[0] if dims else "parameters", float(size) * LIMITS.motion, f"{size} motions at once")
     return Inputs(dims, shape, coords, together, tuple(given))
+
+
+def inputs_in_gaps(system: System, inputs: Inputs) -> Inputs:
+    """The inputs for `system.in_gap_coordinates`; the same object where that is the system itself."""
+    if (inner := system.in_gap_coordinates) is system:
+        return inputs
+    twin, own = inputs.with_numbers(inner), len(system.model.coordinates)
+    starts, rest = list(inputs.values.values())[: 2 * own], list(inputs.values.items())[2 * own :]
+    sums = twin.model.gap_states(inputs.values["time"], starts[:own], starts[own:], twin.load)
+    called = state_names(twin.model.coordinates)
+    return replace(inputs, values=dict(zip(called, [*sums[0], *sums[1]], strict=True)) | dict(rest))
 
 
 def _starts(system: System, velocity: Any, time: Any, coordinates: Mapping[str, Any]) -> dict[str, Any]:

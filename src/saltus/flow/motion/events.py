@@ -10,7 +10,7 @@ from typing import Any, Self, overload
 import numpy as np
 
 from saltus.result import RowTable
-from saltus.systems import Model
+from saltus.systems import Model, System
 
 
 class EventKind(StrEnum):
@@ -164,6 +164,10 @@ class MotionEvents(RowTable, Sequence[Event]):
         margin."""
         return self._labels[:, 3]
 
+    def in_own_coordinates(self, system: System) -> MotionEvents:
+        """The events with velocities of a system's own coordinates, from those of `system.in_gap_coordinates`."""
+        return self
+
     def impacts(self, *also: EventKind) -> Impacts:
         """The impacts, and the events of other kinds if wanted, as arrays."""
         impacts = self._of_kinds(EventKind.IMPACT, *also)
@@ -202,6 +206,14 @@ class ContactEvents(MotionEvents):
 
     def _parts(self, index: Any) -> list[np.ndarray]:
         return np.split(self._values[index, 1:], [self._own, 2 * self._own], axis=-1)
+
+    def in_own_coordinates(self, system: System) -> ContactEvents:
+        """The events with velocities of a system's own coordinates, from those of `system.in_gap_coordinates`."""
+        values = self._values.copy()
+        for i in (1, 1 + self._own):  # before and after
+            velocity = self._values[:, i : i + self._own].T
+            values[:, i : i + self._own] = system.from_gaps(self.times, velocity, velocity)[1].T
+        return ContactEvents(self.times, self._labels, values, self._contacts, self._frictions)
 
     def _called(self, bits: int) -> str:
         chosen = [name for i, name in enumerate((*self._contacts, *self._frictions)) if bits >> i & 1]

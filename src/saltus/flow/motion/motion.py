@@ -72,7 +72,7 @@ class Motion(Result):
     impacts
         The impacts among them, as arrays.
     dense
-        The Taylor series of all its steps; None where they were not kept.
+        The Taylor series of all its steps, in `system.in_gap_coordinates`; None where they were not kept.
     kept
         The states at the times that `simulate(times=...)` was given.
     sampled_validity
@@ -198,6 +198,7 @@ class Motion(Result):
             tile = np.ones(times.size)
             return position[:, None] * tile, velocity[:, None] * tile, self.side * tile
         position, velocity, side = self.dense.states(times)
+        position, velocity = self.system.from_gaps(times, position, velocity)
         end = times >= self.time  # the end itself is known exactly, and after an impact there
         position[:, end], velocity[:, end] = np.reshape(self.position, (-1, 1)), np.reshape(self.velocity, (-1, 1))
         side[end] = self.side
@@ -216,7 +217,7 @@ class Motion(Result):
         if found is None:
             if self.dense is None and self.time > self.start:
                 raise ParameterError("a motion computed with dense=False has no validity; leave dense out, or give times=...")
-            check = ValidityCheck(self.system)
+            check = ValidityCheck(self.system.in_gap_coordinates)
             if self.dense is not None:
                 check.add(self.dense)
             found = check.result(self.time - self.start)
@@ -267,6 +268,23 @@ class Motion(Result):
             Dimensionless times, (n,).
         """
         return to_dataset(self, times)
+
+
+def in_own_coordinates(system: System, motion: Motion) -> Motion:
+    """The motion of a system, from that of `system.in_gap_coordinates`; the same object where that is the system itself."""
+    if motion.system is system:
+        return motion
+    position, velocity = system.from_gaps(motion.time, motion.position, motion.velocity)
+    one, events, kept = len(position) == 1, motion.events.in_own_coordinates(system), motion.kept
+    return replace(
+        motion,
+        system=system,
+        position=float(position[0]) if one else tuple(position.tolist()),
+        velocity=float(velocity[0]) if one else tuple(velocity.tolist()),
+        events=events,
+        impacts=events.impacts(),
+        kept=kept and Samples(kept.time, *system.from_gaps(kept.time, kept.position, kept.velocity), kept.side),
+    )
 
 
 # --- as a dataset ----------------------------------------------------------------------------------------------------

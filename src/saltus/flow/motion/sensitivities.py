@@ -14,13 +14,13 @@ from saltus.flow.contacts.layout import ImpactDetail
 from saltus.flow.kernel.compiled import Program
 from saltus.flow.kernel.layout import GrazingDetail, RestDetail
 from saltus.flow.motion.events import EventKind, Stop
-from saltus.flow.motion.motion import Motion, state_names
+from saltus.flow.motion.motion import Motion, in_own_coordinates, state_names
 from saltus.flow.motion.simulate import Followed, MotionRequest, follow
 from saltus.flow.motion.validity import DenseOutput
 from saltus.progress import Progress, silent
 from saltus.public_functions import Numbers
 from saltus.result import Result, result_dataset
-from saltus.systems import System, check_system, constrained_acceleration
+from saltus.systems import System, check_system, constrained_acceleration, substitute
 from saltus.taylor import FREQUENCY
 
 if TYPE_CHECKING:
@@ -129,7 +129,11 @@ class Sensitivities(Result):
             assert self.tangent is not None
             rates = self.tangent.states(wanted[inner])[:2]
             own = len(motion.system.model.coordinates)
-            found[inner] = np.concatenate([x.reshape(-1, own, x.shape[1]) for x in rates], axis=1).transpose(2, 1, 0)
+            columns = np.concatenate([x.reshape(-1, own, x.shape[1]) for x in rates], axis=1).transpose(2, 1, 0)
+            start = motion._states(np.array([motion.start]))[:2]
+            found[inner] = OwnColumns(motion.system, self.parameter_paths, motion.start, start).later(
+                wanted[inner], motion, columns
+            )
         return found[0] if np.ndim(times) == 0 else found
 
     @property
@@ -228,25 +232,92 @@ def derivatives_of(request: MotionRequest, run: Program | None, progress: Progre
     """`sensitivities` of a request, with its program if that is known."""
     followed, paths = follow(request, progress, run), request.sensitivities or ()
     motion, n = followed.motion, len(request.system.model.coordinates)
-    shift, columns = _end_shift(followed, paths, request.periods), followed.columns
-    if shift.any():
-        columns = columns + np.outer(state_rates(motion), shift)
+    shift, rates, at_end = _end_shift(followed, paths, request.periods), state_rates(motion), followed.columns
+    seen, event_times = in_own_coordinates(request.given, motion), followed.shifts
+    if seen is not motion:
+        start = request.given.from_gaps(float(request.time), request.position, request.speeds)
+        own = OwnColumns(request.given, paths, float(request.time), [x[:, None] for x in start])
+        at_end, event_times = own.later(np.array([motion.time]), seen, at_end[None])[0], own.of_start(event_times)
+        rates = own.rates(motion.time, rates)
+    columns = at_end + np.outer(rates, shift) if shift.any() else at_end
     return Sensitivities(
-        motion=motion,
+        motion=seen,
         state=columns[:, : 2 * n],
         parameters=columns[:, 2 * n :],
         parameter_paths=paths,
-        event_times=followed.shifts,
+        event_times=event_times,
         grazings=np.array([event.time for event in motion.events.of(EventKind.GRAZING)]),
         undefined=_undefined(motion, columns),
         tangent=followed.tangent,
-        at_end=followed.columns,
+        at_end=at_end,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class OwnColumns:
+    """Derivatives in a system's own coordinates, from those of `system.in_gap_coordinates`; the same where that is itself.
+
+    With the states x of the system and y of the other one, y_0 = in(x_0, c) at the start and x = out(y, c) at a time,
+
+        dx/dx_0 = out_y (dy/dy_0) in_x,    dx/dc = out_y (dy/dc + (dy/dy_0) in_c) + out_c.
+    """
+
+    system: System
+    paths: tuple[str, ...]
+    time: float  # of the start
+    start: Any  # the own coordinates and velocities there, (n, 1) each
+
+    def of_start(self, columns: np.ndarray) -> np.ndarray:
+        """Columns (..., 2 n + parameters) along the own state at the start and along parameters at this fixed state."""
+        rows, _ = self._model.sums()
+        n = len(rows)
+        into, first = np.kron(np.eye(2), np.array(rows, dtype=float)), columns[..., : 2 * n]
+        moved = first @ self._by_numbers("in_gaps", self.time, *self.start)[0]
+        return np.concatenate([first @ into, columns[..., 2 * n :] + moved], axis=-1)
+
+    def later(self, times: np.ndarray, motion: Motion, columns: np.ndarray) -> np.ndarray:
+        """Columns (m, 2 n, 2 n + parameters) at times (m,) of a motion of the system."""
+        if self._model is self.system.model:
+            return columns
+        out = np.kron(np.eye(2), np.array(self._model.from_gaps(), dtype=float))
+        found = out @ self.of_start(columns)
+        position, velocity, _ = motion._states(times) if motion.dense else (*_end_of(motion), None)
+        found[..., len(out) :] += self._by_numbers("own", times, *self.system.to_gaps(times, position, velocity))
+        return np.asarray(found)
+
+    def rates(self, time: float, rates: np.ndarray) -> np.ndarray:
+        """The velocity and acceleration of the own coordinates at a time, (2 n,)."""
+        velocity, acceleration = np.split(rates, 2)
+        load, (v, a) = self.system.load, ([*x] if len(x) > 1 else x[0] for x in (velocity, acceleration))
+        return np.concatenate([np.atleast_1d(self._model.own(time, x, load, order)) for order, x in ((1, v), (2, a))])
+
+    @property
+    def _model(self) -> Any:
+        return self.system.in_gap_coordinates.model
+
+    def _by_numbers(self, method: str, times: Any, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        """The derivatives of `own` or `in_gaps` to the parameters, (m, 2 n, parameters), from their values at complex numbers."""
+        step, found = 1e-100, np.zeros((position.shape[1], 2 * len(position), len(self.paths)))
+        for j, path in enumerate(self.paths):
+            chosen = {path: 1j * step}
+            twin = substitute(self.system.in_gap_coordinates, lambda at, x, by=chosen: x + by[at] if at in by else x)  # type: ignore[misc]
+            for order, values in enumerate((position, velocity)):
+                given = [*values] if len(values) > 1 else values[0]
+                changed = getattr(twin.model, method)(times, given, twin.load, order)
+                each = changed if isinstance(changed, tuple) else (changed,)
+                for i, value in enumerate(each):
+                    found[:, order * len(values) + i, j] = np.imag(value) / step
+        return found
+
+
+def _end_of(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+    """The coordinates and velocities at the end, (n, 1) each."""
+    return np.atleast_1d(motion.position)[:, None], np.atleast_1d(motion.velocity)[:, None]
 
 
 def _paths(system: System, parameters: Iterable[str]) -> tuple[str, ...]:
     """The checked paths of the parameters to differentiate to."""
-    check_system(system, "sensitivities", several_contacts=True)
+    check_system(system, "sensitivities", several_contacts=True, own_coordinates=True)
     return check_names("parameters", parameters, "parameters, such as ['load.frequency']")
 
 

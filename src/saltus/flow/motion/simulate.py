@@ -15,7 +15,7 @@ from saltus.flow.kernel.compiled import Program, limits_of, program
 from saltus.flow.kernel.layout import Mode, Status
 from saltus.flow.motion.events import Stop
 from saltus.flow.motion.kernel_state import MOST, ContactState, KernelState, Recorder
-from saltus.flow.motion.motion import Motion
+from saltus.flow.motion.motion import Motion, in_own_coordinates
 from saltus.flow.motion.validity import DenseOutput
 from saltus.progress import Progress, silent
 from saltus.public_functions import Numbers
@@ -92,7 +92,8 @@ class MotionRequest:
     dense: bool
     times: Any = None
     sensitivities: tuple[str, ...] | None = None  # parameters to differentiate to; None without derivatives
-    # These follow from the arguments:
+    # These follow from the arguments; the system is put into coordinates of its gaps, and so are position and speeds:
+    given: System = field(init=False)  # the system as it was given
     position: np.ndarray = field(init=False)
     speeds: np.ndarray = field(init=False)
     limits: tuple[str, ...] = field(init=False)  # margins that end the motion
@@ -100,14 +101,14 @@ class MotionRequest:
     sample_times: np.ndarray | None = field(init=False)
 
     def __post_init__(self) -> None:
-        check_system(self.system, "simulate", several_contacts=True)
+        check_system(self.system, "simulate", several_contacts=True, own_coordinates=True)
         for name, value in self._read().items():
             object.__setattr__(self, name, value)
 
     def _read(self) -> dict[str, Any]:
         """The fields that follow from the arguments."""
         arguments = (*ARGUMENTS, "times" if self.sensitivities is None else "parameters")
-        position, speeds = np.split(read_start(self.system, self.velocity, self.coordinates, arguments), 2)
+        position, speeds = np.split(read_start(self.system, self.velocity, self.coordinates, arguments, self.time), 2)
         for name, value in zip(self.system.model.coordinates, position, strict=True):
             if self.system.model.unit_of(name) == "rad":
                 notice_degrees(name, value)
@@ -116,10 +117,13 @@ class MotionRequest:
         check_number("time", self.time)
         if self.side not in (None, 1, -1):
             raise ParameterError(f"side must be +1 or -1, got {self.side!r}", "side")
+        position, speeds = self.system.to_gaps(float(self.time), position, speeds)
         when = clock(float(self.time), self.system.load.period, self.periods, self.duration)
         if self.dense and self.times is None:
             _check_dense(when, self.periods, self.duration)
         return {
+            "given": self.system,
+            "system": self.system.in_gap_coordinates,
             "position": position,
             "speeds": speeds,
             "limits": limits,
@@ -218,7 +222,7 @@ def simulate(
         dense=dense,
         times=times,
     )
-    return follow(request, progress).motion
+    return in_own_coordinates(system, follow(request, progress).motion)
 
 
 @dataclass(frozen=True)

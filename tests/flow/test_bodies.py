@@ -1,0 +1,410 @@
+"""Contacts between bodies and with walls that move: motions, events, derivatives, ensembles and orbits, against exact results."""
+
+import dataclasses
+import itertools
+import math
+import pickle
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+import saltus
+from saltus.flow import sensitivities, simulate, simulate_many
+from saltus.systems import Contact, ContactModel, Friction, Harmonic, ImpactPair, Load, NewtonImpact, System, energy_gain
+
+
+@dataclass(frozen=True, kw_only=True)
+class Damper(ContactModel):
+    """An impact damper in the positions of case and mass, not in their distance as `ImpactPair`."""
+
+    mass_ratio: float = 0.1
+    damping: float = 0.02
+    room: float = 1.0
+
+    coordinates: ClassVar[tuple[str, ...]] = ("z", "y")
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+
+    @property
+    def contacts(self):
+        apart = {"y": 1.0, "z": -1.0}
+        return (
+            Contact(name="left", coordinate=apart, position=-self.room),
+            Contact(name="right", coordinate={"z": 1.0, "y": -1.0}, position=-self.room),  # the same sum, turned
+        )
+
+    def mass_matrix(self, q):
+        return [[1.0, 0.0], [0.0, self.mass_ratio]]
+
+    def force(self, t, q, velocity, load):
+        return load.force(t) - self.damping * velocity[0] - q[0], 0.0 * q[1]
+
+
+SHAKE = Load(frequency=1.0, force=Harmonic(amplitude=0.05))
+DAMPER = System(model=Damper(), load=SHAKE, impact=NewtonImpact(e=0.6))
+PAIR = System(model=ImpactPair(damping=0.02), load=SHAKE, impact=NewtonImpact(e=0.6))
+
+
+@pytest.mark.parametrize("periods", [20, 1000])
+def test_two_bodies_that_hit_each_other_move_as_in_the_coordinate_of_their_distance(periods):
+    bodies = simulate(DAMPER, z=0.0, y=0.0, velocity=(0.0, 0.1), periods=periods)
+    pair = simulate(PAIR, z=0.0, x=0.0, velocity=(0.0, 0.1), periods=periods)
+    assert len(bodies.impacts) == len(pair.impacts) > periods
+    np.testing.assert_allclose([bodies.z, bodies.y], [pair.z, pair.z + pair.x], rtol=0, atol=1e-12)
+    into = np.array([[1.0, 0.0], [1.0, 1.0]])
+    np.testing.assert_allclose(bodies.velocity, into @ pair.velocity, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(bodies.impacts.time, pair.impacts.time, rtol=0, atol=1e-11)
+    times = np.linspace(0.0, bodies.time, 300)
+    for one, other in zip(bodies.at(times), pair.at(times), strict=True):
+        np.testing.assert_allclose(one, into @ other, rtol=0, atol=1e-11)
+    for one, other in zip(bodies.events[:5], pair.events[:5], strict=True):
+        assert (one.kind, one.contact) == (other.kind, other.contact)
+        np.testing.assert_allclose(one.velocity_after, into @ other.velocity_after, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(one.impulse, other.impulse, rtol=0, atol=1e-12)
+        jump = np.subtract(one.velocity_after, one.velocity_before)
+        assert abs(jump[0] + 0.1 * jump[1]) < 1e-14  # momentum
+
+
+def row_of_balls(count):
+    """Balls on a line, with masses m0, m1, ... and one size, and springs of stiffness k between neighbours."""
+    names = tuple(f"x{i}" for i in range(count))
+
+    def contacts(self):
+        pairs = itertools.pairwise(names)
+        return tuple(Contact(name=f"{a}{b}", coordinate={b: 1.0, a: -1.0}, position=self.size) for a, b in pairs)
+
+    def mass_matrix(self, q):
+        return [[getattr(self, f"m{i}") * (i == j) for j in range(count)] for i in range(count)]
+
+    def force(self, t, q, velocity, load):
+        pulls = [self.k * (b - a - 2.0) for a, b in itertools.pairwise(q)]
+        return [right - left for left, right in zip([0.0, *pulls], [*pulls, 0.0], strict=True)]
+
+    fields = [(name, float, dataclasses.field(default=1.0)) for name in (*(f"m{i}" for i in range(count)), "size", "k")]
+    space = {"coordinates": names, "contacts": property(contacts), "mass_matrix": mass_matrix, "force": force}
+    return dataclasses.make_dataclass("Row", fields, bases=(ContactModel,), namespace=space, frozen=True, kw_only=True)
+
+
+def test_ten_balls_in_a_row_exchange_their_speeds():
+    row, random = row_of_balls(10), np.random.default_rng(1)
+    system = System(model=row(size=0.0, k=0.0), impact=NewtonImpact(e=1.0))
+    begin, speeds = np.sort(random.uniform(0.0, 10.0, 10)), random.normal(size=10)
+    motion = simulate(system, **dict(zip(row.coordinates, begin, strict=True)), velocity=tuple(speeds), duration=60.0)
+    lines = begin + 60.0 * speeds  # equal balls without loss are lines that pass through one another
+    order = np.argsort(lines)
+    np.testing.assert_allclose(motion.position, lines[order], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(motion.velocity, speeds[order], rtol=0, atol=1e-13)
+    i, j = np.triu_indices(10, 1)
+    crossings = (begin[i] - begin[j]) / (speeds[j] - speeds[i])
+    met = np.sort(crossings[(crossings > 0.0) & (crossings < 60.0)])
+    assert met.size == len(motion.impacts) > 20
+    np.testing.assert_allclose(motion.impacts.time, met, rtol=0, atol=1e-11)
+
+
+def test_balls_that_touch_are_hit_together_by_the_law_of_all_gaps():
+    """Not one after the other: the gap that is hit opens with e times its speed, and the others, which stay closed, with none."""
+    row = row_of_balls(3)
+    system = System(model=row(size=0.5, k=0.0), impact=NewtonImpact(e=1.0))
+    motion = simulate(system, x0=-1.5, x1=0.0, x2=0.5, velocity=(1.0, 0.0, 0.0), duration=2.0)
+    (hit,) = [event for event in motion.events if event.kind == "impact"]
+    assert (hit.time, hit.contact) == (1.0, "x0x1")
+    np.testing.assert_allclose(motion.velocity, [-1 / 3, 2 / 3, 2 / 3], rtol=0, atol=1e-15)
+
+
+EIGHT = row_of_balls(8)
+
+
+def energy(model, position, velocity):
+    masses = np.array([getattr(model, f"m{i}") for i in range(len(position))])[:, None]
+    return (masses * velocity**2).sum(axis=0) / 2 + model.k * ((np.diff(position, axis=0) - 2.0) ** 2).sum(axis=0) / 2
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_rows_of_eight_keep_their_momentum_and_lose_what_the_law_says(seed):
+    random = np.random.default_rng(seed)
+    masses, e = random.uniform(0.2, 3.0, 8), random.uniform(0.3, 1.0)
+    model = EIGHT(**{f"m{i}": float(m) for i, m in enumerate(masses)}, size=0.5, k=float(random.uniform(0.1, 2.0)))
+    system = System(model=model, impact=NewtonImpact(e=float(e)))
+    begin = np.cumsum(random.uniform(0.6, 1.5, 8))
+    velocity = tuple(4.0 * random.normal(size=8))
+    motion = simulate(system, **dict(zip(EIGHT.coordinates, begin, strict=True)), velocity=velocity, duration=20.0)
+    assert len(motion.impacts) >= 10
+    times = np.linspace(0.0, 20.0, 100)
+    position, rates = motion.at(times)
+    assert (np.diff(position, axis=0) > 0.5 - 1e-12).all()
+    np.testing.assert_allclose(masses @ rates, masses @ velocity, rtol=0, atol=1e-12)
+    lost = np.zeros(times.size)
+    for event in motion.events:
+        if event.kind == "impact":
+            closing = np.minimum(np.diff(event.velocity_before), 0.0)
+            lost += np.where(times >= event.time, (1.0 - e) * np.dot(event.impulse, -closing) / 2, 0.0)
+    stored = energy(model, position, rates)
+    assert not [event for event in motion.events if event.kind == "held"]  # those lose more, in impacts that are not resolved
+    np.testing.assert_allclose(stored + lost, stored[0], rtol=0, atol=1e-11 * stored[0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ball(ContactModel):
+    """x'' = -g above a table, and below a ceiling at a height over it, that move with the ground."""
+
+    gravity: float = 1.0
+    height: float = 50.0
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+    channels: ClassVar[tuple[str, ...]] = ("ground",)
+
+    @property
+    def contacts(self):
+        over = {"x": 1.0, "ground": -1.0}
+        return Contact(name="table", coordinate=over), Contact(name="ceiling", coordinate=over, sign=-1, position=self.height)
+
+    def force(self, t, x, velocity, load):
+        return -self.gravity
+
+
+def on_a_table(amplitude, e=0.6):
+    load = Load(frequency=1.0, ground=Harmonic(amplitude))
+    return System(model=Ball(), load=load, impact=NewtonImpact(e=e))
+
+
+def between(speed, e, height):
+    """Times and speeds of the impacts of a ball thrown up from the floor, while it reaches the ceiling."""
+    time, met = 0.0, []
+    while speed**2 > 2.0 * height:
+        top = math.sqrt(speed**2 - 2.0 * height)
+        time += speed - top
+        met.append((time, top))
+        fallen = math.sqrt((e * top) ** 2 + 2.0 * height)
+        time += fallen - e * top
+        met.append((time, -fallen))
+        speed = e * fallen
+    return np.array(met).T
+
+
+@pytest.mark.parametrize("e", [1.0, 0.9, 0.97])
+def test_a_ball_between_floor_and_ceiling_follows_its_closed_form(e):
+    system = System(model=Ball(height=1.0), impact=NewtonImpact(e=e))
+    motion = simulate(system, x=0.0, velocity=4.0, duration=40.0)
+    if e == 1.0:
+        up = 4.0 - math.sqrt(14.0)  # 4 t - t^2 / 2 = 1
+        times, speeds = up * np.arange(1, 1 + len(motion.impacts)), np.where(np.arange(len(motion.impacts)) % 2, -4.0, 14.0**0.5)
+    else:
+        times, speeds = between(4.0, e, 1.0)
+    assert times.size > 8
+    np.testing.assert_allclose(motion.impacts.time[: times.size], times, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(motion.impacts.velocity_before[: times.size].ravel(), speeds, rtol=0, atol=1e-12)
+
+
+def test_a_table_that_shakes_is_a_moving_frame():
+    """x = r + w(t), where r moves over a table at rest under the force -g - w''."""
+    still = dataclasses.make_dataclass(
+        "Relative",
+        [],
+        bases=(Ball,),
+        namespace={
+            "contacts": property(lambda self: tuple(dataclasses.replace(c, coordinate="x") for c in Ball.contacts.fget(self))),
+            "force": lambda self, t, x, velocity, load: -self.gravity - load.ground.acceleration(t),
+        },
+        frozen=True,
+        kw_only=True,
+    )
+    load = Load(frequency=2.0, ground=[Harmonic(0.3, phase=0.4), Harmonic(0.1, order=2), 0.25])
+    system = System(model=Ball(height=3.0), load=load, impact=NewtonImpact(e=0.7))
+    ball = simulate(system, x=1.5, velocity=0.3, periods=40, time=0.2)
+    frame = System(model=still(height=3.0), load=load, impact=NewtonImpact(e=0.7))
+    over = simulate(frame, x=1.5 - load.ground(0.2), velocity=0.3 - load.ground.velocity(0.2), periods=40, time=0.2)
+    assert len(ball.impacts) == len(over.impacts) > 60
+    np.testing.assert_allclose(ball.x, over.x + load.ground(ball.time), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(ball.velocity, over.velocity + load.ground.velocity(ball.time), rtol=0, atol=1e-12)
+    v = ball.impacts.velocity_after[:, 0]
+    np.testing.assert_allclose(v, over.impacts.velocity_after[:, 0] + load.ground.velocity(ball.impacts.time), atol=1e-12)
+    data = ball.to_xarray()
+    assert (data.x - load.ground(data.time.values) > -1e-12).all()
+
+
+def test_a_ball_that_rests_on_a_table_moves_with_it_until_it_is_thrown():
+    """It is pressed while w'' > -g: from 0 to where a sin(t) = g."""
+    system = on_a_table(1.6)
+    motion = simulate(system, x=0.0, velocity=1.6, duration=1.0)
+    rest, event = motion.events
+    assert [(e.kind, e.contact) for e in motion.events] == [("rest", "table"), ("release", "table")]
+    assert (rest.time, rest.velocity_after) == (0.0, (1.6,))
+    assert event.time == pytest.approx(math.asin(1.0 / 1.6), abs=1e-12)
+    x, v = motion.at(0.5)
+    assert abs(x - 1.6 * math.sin(0.5)) < 1e-15
+    assert abs(v - 1.6 * math.cos(0.5)) < 1e-15
+
+
+@pytest.mark.parametrize("e", [0.6, 0.3])
+def test_a_bounce_of_period_one_is_born_and_doubled_where_its_closed_form_says(e):
+    """With g = Omega = 1 it is born at a = pi (1 - e) / (1 + e), where the table must give back all that impacts take, and
+    doubles where a^2 = [pi (1 - e) / (1 + e)]^2 + [2 (1 + e^2) / (1 + e)^2]^2 (Holmes 1982; Luo and Han 1996)."""
+    born = math.pi * (1.0 - e) / (1.0 + e)
+    doubled = math.hypot(born, 2.0 * (1.0 + e**2) / (1.0 + e) ** 2)
+    amplitude = 0.5 * (born + doubled)
+    thrown = math.acos(born / amplitude)  # the phase of the impacts, at which the table has the speed `born`
+    system = on_a_table(amplitude, e)
+    begin = simulate(system, x=amplitude * math.sin(thrown), velocity=math.pi, time=thrown, duration=2 * math.pi - thrown)
+    orbit = saltus.find_orbit(system.in_gap_coordinates, x=begin.x, velocity=begin.velocity, period=1, settle=0)
+    assert orbit.stable
+    branch = saltus.continue_orbit(orbit, "load.ground.amplitude", (0.9 * born, 1.1 * doubled))
+    places = {str(point.kind): point.parameter for point in branch.special if point.kind in ("LP", "PD")}
+    assert places == {"LP": pytest.approx(born, abs=1e-10), "PD": pytest.approx(doubled, abs=1e-10)}
+
+
+# --- all at once: coefficients that are no whole numbers, a table that shakes, and a mass that hits both -----------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lever(ContactModel):
+    """A mass x over a shaking table, and a mass y that a lever of the ratio `arm` lets hit the first one."""
+
+    mass: float = 0.7
+    arm: float = 1.5
+    room: float = 0.1
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x", "y")
+    channels: ClassVar[tuple[str, ...]] = ("force", "ground")
+
+    @property
+    def contacts(self):
+        lever = Contact(name="lever", coordinate={"y": 1.0, "x": -self.arm}, position=self.room)
+        return lever, Contact(name="table", coordinate={"x": 1.0, "ground": -1.0})
+
+    def mass_matrix(self, q):
+        return [[1.0, 0.0], [0.0, self.mass]]
+
+    def force(self, t, q, velocity, load):
+        damped = [0.05 * v for v in velocity]
+        return load.force(t) - damped[0] - 1.3 * q[0] - 0.5, -1.3 * (q[1] - 1.0) - damped[1] - 0.4
+
+    def kinetic_energy(self, t, q, velocity, side, load):
+        return (velocity[0] ** 2 + self.mass * velocity[1] ** 2) / 2
+
+    def margins(self, t, q, velocity, acceleration, side, load):
+        return {"low": 2.0 - q[1], "slow": 3.0 - velocity[0]}
+
+
+LEVER = System(
+    model=Lever(),
+    load=Load(frequency=1.1, force=Harmonic(0.3), ground=Harmonic(0.2, phase=0.3)),
+    impact=NewtonImpact(e=0.8),
+)
+PATHS = ("model.mass", "model.arm", "model.room", "load.ground.amplitude", "load.ground.phase", "load.frequency", "impact.e")
+
+
+@pytest.mark.parametrize("span", [{"periods": 3}, {"duration": 16.0}])
+def test_derivatives_are_those_of_the_own_coordinates(span):
+    given = {"x": 0.5, "y": 1.3, "velocity": (0.2, -0.1), "time": 0.4, **span}
+    found = sensitivities(LEVER, parameters=PATHS, **given)
+    step, columns, times = 1e-6, [], []
+
+    def ends(system, **more):
+        motion = simulate(system, **{**given, **more})
+        return motion.final_state, motion.events.times
+
+    for j in range(4 + len(PATHS)):
+        pair = []
+        for sign in (step, -step):
+            moved = np.array([0.5, 1.3, 0.2, -0.1]) + sign * (np.arange(4) == j)
+            system = LEVER if j < 4 else LEVER.with_({PATHS[j - 4]: LEVER.get(PATHS[j - 4]) + sign})
+            pair.append(ends(system, x=moved[0], y=moved[1], velocity=tuple(moved[2:])))
+        columns.append((pair[0][0] - pair[1][0]) / (2 * step))
+        times.append((pair[0][1] - pair[1][1]) / (2 * step))
+    assert len(found.motion.impacts) > 20
+    np.testing.assert_allclose(np.hstack([found.state, found.parameters]), np.array(columns).T, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(found.event_times, np.array(times).T, rtol=0, atol=1e-7)
+    early = sensitivities(LEVER, parameters=PATHS, **{**given, "periods": None, "duration": 9.0})
+    np.testing.assert_allclose(found.at(9.4), early.at_end, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(found.at(0.4)[:, :4], np.eye(4), rtol=0, atol=1e-15)
+
+
+def test_motions_in_lanes_are_those_that_are_followed_one_by_one():
+    random = np.random.default_rng(0)
+    x, amplitude, mass = 0.3 + random.uniform(0, 0.3, 16), random.uniform(0.05, 0.3, 16), random.uniform(0.4, 1.0, 16)
+    changes = {"load.ground.amplitude": amplitude, "model.mass": mass}
+    given = {"y": 1.2, "velocity": (0.1, 0.0), "time": 0.3, "periods": 6.4}
+    many = simulate_many(LEVER, x=x, parameters=changes, last=3, **given)
+    for i in range(16):
+        one = simulate(LEVER.with_({path: float(values[i]) for path, values in changes.items()}), x=float(x[i]), **given)
+        state = np.array([many[name].values[i] for name in ("x", "y", "x_velocity", "y_velocity")])
+        np.testing.assert_allclose(state, one.final_state, rtol=0, atol=1e-11)
+        assert many.impact_count.values[i] == len(one.impacts)
+        for k, time in enumerate((0.3 + 10 * math.pi / 1.1, 0.3 + 12 * math.pi / 1.1)):
+            sampled = [many[f"sampled_{name}"].values[i, k] for name in ("x", "y", "x_velocity", "y_velocity")]
+            np.testing.assert_allclose(sampled, np.concatenate(one.at(time)), rtol=0, atol=1e-11)
+    with pytest.raises(saltus.SaltusError, match=r"give system\.in_gap_coordinates, which has sum_at_lever, x_minus_ground"):
+        simulate_many(LEVER, x=x, sample="extrema", **given)
+
+
+def test_margins_and_energies_are_those_of_the_own_coordinates():
+    motion = simulate(LEVER, x=0.5, y=1.3, velocity=(0.2, -0.1), periods=5, stop_at=["low"])
+    assert motion.validity.first == {"low": None, "slow": None}
+    fast = simulate(LEVER, x=0.5, y=1.9, velocity=(0.2, 1.0), periods=5, stop_at=["low"])
+    assert fast.limit == "low"
+    assert fast.y == pytest.approx(2.0, abs=1e-12)
+    balance = saltus.energies(simulate(DAMPER, z=0.0, y=0.9, velocity=(0.2, 0.4), periods=20), periods=20)
+    assert abs(balance.defect) < 1e-12
+    assert float(balance.energy.sel(part="impact.left")) > 0.0
+    assert energy_gain(Damper(), NewtonImpact(e=0.6)) == pytest.approx(energy_gain(ImpactPair(), NewtonImpact(e=0.6)), abs=1e-15)
+
+
+def test_systems_in_gap_coordinates_are_files_and_messages_to_other_processes_like_all_others():
+    saltus.register(Lever)
+    inner = LEVER.in_gap_coordinates
+    assert inner.in_gap_coordinates is inner
+    assert inner.model.coordinates == ("sum_at_lever", "x_minus_ground")
+    assert System.from_json(inner.to_json()) == inner
+    assert System.from_json(LEVER.to_json()) == LEVER
+    assert pickle.loads(pickle.dumps(inner)) == inner
+    assert inner.parameters == LEVER.parameters
+    assert LEVER.with_({"model.arm": 2.0}).in_gap_coordinates == inner.with_({"model.arm": 2.0})
+
+
+def model_with(*contacts, names=("x", "y"), frictions=(), body=None):
+    body = body or {}
+    parts = {"coordinates": names, "channels": ("force", "ground"), "contacts": contacts, "frictions": frictions}
+    right = {"force": lambda self, t, q, v, load: [-x for x in q] if len(names) > 1 else -q}
+    return dataclasses.make_dataclass("Made", [], bases=(ContactModel,), namespace=parts | right | body, frozen=True)()
+
+
+SUM = {"x": 1.0, "y": 1.0}
+REFUSED = {
+    "which follows from what a, b keep": (
+        Contact(name="a", coordinate="x"),
+        Contact(name="b", coordinate="y"),
+        Contact(name="c", coordinate=SUM),
+    ),
+    "up to a displacement": (
+        Contact(name="a", coordinate={"x": 1.0, "ground": -1.0}),
+        Contact(name="b", coordinate="x", sign=-1),
+    ),
+    "holds 'force', none of x, y, ground": (Contact(name="a", coordinate={"x": 1.0, "force": 1.0}),),
+    "holds 'w', none of": (Contact(name="a", coordinate={"w": 1.0}),),
+    "coefficients that are numbers other than 0, got 0.0": (Contact(name="a", coordinate={"x": 0.0, "y": 1.0}),),
+    "and no coordinate of": (Contact(name="a", coordinate={"ground": 1.0}),),
+    "a dictionary such as": (Contact(name="a", coordinate=("x", "y")),),
+    "leave .* no room": (Contact(name="a", coordinate=SUM), Contact(name="b", coordinate=SUM, sign=-1)),
+}
+
+
+@pytest.mark.parametrize("sentence", REFUSED)
+def test_sums_without_meaning_are_refused_when_the_system_is_made(sentence):
+    with pytest.raises(saltus.ParameterError, match=sentence):
+        System(model=model_with(*REFUSED[sentence]))
+
+
+def test_what_cannot_be_followed_is_refused_when_the_system_is_made():
+    moving = Contact(name="a", coordinate={"x": 1.0, "ground": -1.0})
+    heavy = {"mass_matrix": lambda self, q: [[1.0 + q[0] ** 2, 0.0], [0.0, 1.0]]}
+    with pytest.raises(saltus.ParameterError, match="the mass matrix of Made depends on its coordinates"):
+        System(model=model_with(moving, body=heavy))
+    rubbed = (Friction(name="f", coordinate="x", kinetic=0.1), Friction(name="g", coordinate="y", kinetic=0.1))
+    with pytest.raises(saltus.ParameterError, match="and from the coordinates of frictions"):
+        System(model=model_with(Contact(name="a", coordinate=SUM), frictions=rubbed))
+    made = System(model=model_with(Contact(name="a", coordinate={"y": 1.0, "x": -1.0})), load=Load(frequency=1.0))
+    with pytest.raises(saltus.ParameterError, match=r"find_orbit works in coordinates .* which has x, y_minus_x"):
+        saltus.find_orbit(made, x=0.0, y=0.0)
+    with pytest.raises(saltus.ParameterError, match="y_minus_z = -2 lies beyond the contact 'left' at y_minus_z = -1"):
+        simulate(DAMPER, z=0.0, y=-2.0, duration=1.0)
