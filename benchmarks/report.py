@@ -114,9 +114,9 @@ def _fits(rows: list[dict[str, Any]] | None) -> str:
         for row in rows
     ]
     return (
-        "## A fit with exact derivatives, on one core\n\nFrom 300 noisy samples of 12 units of time, from a guess 3 % off. SciPy's "
-        "`least_squares` with two-point differences of `simulate` ends at the loosest of its tolerances with which it misses the "
-        "least squares by less than 1e-5 standard errors.\n\n" + table(head, cells)
+        "## A fit with exact derivatives, on one core\n\nFrom 300 noisy samples of 12 units of time, from a guess 3 % off. "
+        "SciPy's `least_squares` with two-point differences of `simulate` ends at the loosest of its tolerances with which it "
+        "misses the least squares by less than 1e-5 standard errors.\n\n" + table(head, cells)
     )
 
 
