@@ -1,4 +1,9 @@
-"""Records in files: each format as its publisher describes it, made here from known samples."""
+"""Records in files: each format as its publisher describes it, made here from known samples.
+
+The headings are those of published files: CSMIP's V2 of station 89486 (20 December 2022), whose three components also gave the
+peaks that its headings state; COSMOS 1.20 of AK.BMR (30 November 2018), with 42000 samples in 210 s, raw steps of 20 ms and
+processed ones of 5 ms; and of PEER's AT2 the four that are found in public repositories.
+"""
 
 import numpy as np
 import pytest
@@ -49,14 +54,29 @@ def read(tmp_path, text, **options):
     return Record.read(tmp_path / "r.txt", source="r.txt", **options)
 
 
+def one_a_line(text):
+    """The same file with its samples below one another, as the files of version 1.20 have them."""
+    head, _, numbers = text.partition("(1E15.6)\n")
+    numbers, _, tail = numbers.partition("\nEnd")
+    return f"{head}(1E15.6)\n" + "\n".join(f"{x:15.6e}" for x in ACCELERATION) + "\nEnd" + tail
+
+
 FILES = {
     "AT2": (peer(), 1e-7),
     "old AT2": (peer("ACCELERATION TIME HISTORY IN UNITS OF G", "   43    0.0200    NPTS, DT"), 1e-7),
     "units below": (peer("NPTS= 43, DT= .02 SEC", "ACCELERATION IN UNITS OF G"), 1e-7),
     "CSMIP": (csmip(), 1e-12),
     "older CSMIP": (csmip("(UNITS: CM/SEC/SEC)").upper(), 1e-12),
+    "CSMIP without units": (csmip("").replace("sec, ", "SEC."), 1e-12),
     "COSMOS": (cosmos(), 1e-4),
     "COSMOS, step of the raw samples": (cosmos(raw=0.02, processed=-999.0), 1e-4),
+    "COSMOS, one number a line": (one_a_line(cosmos(said="units=cm/sec2(04),Format=(1E15.6)")), 1e-4),
+    "COSMOS, not corrected": (cosmos().replace("acceleration pts,", "uncor. accel. pts,"), 1e-4),
+    "COSMOS, samples in a second": (
+        cosmos(raw=-999.0).replace("pts, approx   1 secs, units=", "pts a   50 pts/sec, Units="),
+        1e-4,
+    ),
+    "AT2 without spaces": (peer().replace("  ", " ").replace(" -", "-"), 1e-7),
 }
 
 
@@ -139,6 +159,7 @@ REFUSED = {
     ),
     "cut short": (peer(numbers=ACCELERATION[:20]), "file 'r.txt' has 20 of the 43 samples that its headings promise"),
     "letters": (peer().replace("E-", "K-"), "line 5 must be numbers, got the text"),
+    "no units": (peer("ACCELERATION (G)"), "does not say in its headings in which units it is; give them, such as units"),
     "no step": (peer(said="NPTS= 43, DT= 0.0 SEC"), "samples 0 s apart; the step must be above 0"),
     "counts": (
         cosmos(said="units=counts (50),Format=(10F8.2)"),

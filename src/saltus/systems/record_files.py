@@ -37,6 +37,7 @@ UNITS = {
     "n": ("force", 1.0),
     "kn": ("force", 1000.0),
 }
+PLAIN = {"acceleration": "cm/s2", "velocity": "cm/s", "displacement": "cm"}  # of a V2 file that does not say it
 KINDS = {"acc": "acceleration", "vel": "velocity", "dis": "displacement"}  # by their first letters
 PEER_COUNT = re.compile(r"NPTS\s*=\s*(\d+)\s*,?\s*DT\s*=\s*([\d.E+-]+)|^\s*(\d+)\s+([\d.E+-]+)\s+NPTS", re.IGNORECASE)
 PEER_UNITS = re.compile(r"\b(ACC|VEL|DIS)\w*\b.*\bUNITS?\s*(?:OF|:|=)\s*([\w/^.]+)", re.IGNORECASE)
@@ -46,10 +47,12 @@ CSMIP = re.compile(
     re.IGNORECASE,
 )
 COSMOS = re.compile(
-    r"^\s*(\d+)\s+(acc|vel|dis)\w*\s+(?:pts|points),?\s*approx\.?\s*([\d.]+)\s*secs?,\s*units\s*=\s*([\w/^]+)"
-    r"(?:.*\(\s*\d*\s*[fegi](\d+))?",
+    r"^\s*(\d+)\s+(?:[a-z]+\.?\s+)?(acc|vel|dis)\w*\.?\s+(?:pts|points),?\s*(?:approx\.?|at?)\s*"
+    r"([\d.]+\s*(?:secs?|(?:pts|points)/sec))\s*,\s*units?\s*=\s*([\w/^]+)(?:.*\(\s*\d*\s*[fegi](\d+))?",
     re.IGNORECASE,
 )
+DECIMAL = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[ed][-+]?\d+)?"
+TOUCHING = re.compile(rf"{DECIMAL}(?:(?=[-+]){DECIMAL})*", re.IGNORECASE)  # numbers whose signs stand where spaces would
 COSMOS_REALS = re.compile(r"^\s*(\d+)\s+real-header values follow on\s+(\d+)\s+lines.*\(\s*\d*\s*[feg](\d+)", re.IGNORECASE)
 # The places, from 0, of the step of the processed samples in ms, and of the raw ones in s, among the numbers of a COSMOS heading.
 COSMOS_STEPS = ((61, 0.001), (33, 1.0))
@@ -102,16 +105,18 @@ class RecordFile:
         headings = enumerate(self.lines[:MOST_HEADINGS])
         peer = next((i for i, line in headings if PEER_COUNT.search(line)), None)
         if peer is not None:
-            return self._peer(peer)
+            return self._peer(peer, quantity)
         parts = [i for i, line in enumerate(self.lines) if CSMIP.match(line) or COSMOS.match(line)]
         return self._strong_motion(parts, quantity or "acceleration", component) if parts else self._columns()
 
-    def _peer(self, at: int) -> FileSamples:
-        """The samples below the heading with their number and their step, of a file of PEER."""
+    def _peer(self, at: int, quantity: str) -> FileSamples:
+        """The samples below the heading with their number and their step, of a file of PEER; the quantity, if it is given."""
         found = PEER_COUNT.search(self.lines[at])
         assert found is not None
         count, step = int(found[1] or found[3]), _decimal(found[2] or found[4])
         words = next((said for line in self.lines[:MOST_HEADINGS] if (said := PEER_UNITS.search(line))), None)
+        if words is None and not quantity:
+            self.refuse('does not say in its headings in which units it is; give them, such as units="g"', "")
         first = at + 1 if words is None or self.lines[at + 1] != words.string else at + 2
         kind, units = ("", "") if words is None else (KINDS[words[1].lower()], words[2])
         return self._even(count, step, first, None, kind, units)
@@ -127,11 +132,15 @@ class RecordFile:
             self.refuse(f"has {len(own)} components of {quantity}, and no number {component}", "")
         at, found = own[component - 1]
         plain = CSMIP.match(self.lines[at]) is not None
-        step = _decimal(found[3]) if plain else self._cosmos_step(at, int(found[1]), float(found[3]))
-        return self._even(int(found[1]), step, at + 1, int(found[5]) if found[5] else None, quantity, found[4] or "")
+        step = _decimal(found[3]) if plain else self._cosmos_step(at, int(found[1]), found[3])
+        return self._even(int(found[1]), step, at + 1, int(found[5]) if found[5] else None, quantity, found[4] or PLAIN[quantity])
 
-    def _cosmos_step(self, at: int, count: int, span: float) -> float:
-        """The step of the samples below a heading of COSMOS, which has the number of samples and about their duration in s."""
+    def _cosmos_step(self, at: int, count: int, said: str) -> float:
+        """The step of the samples below a heading of COSMOS, which has the number of samples and about their duration in s, or
+        how many there are in a second."""
+        span, each = float(re.sub(r"[^\d.]", "", said.rpartition("/")[0] or said)), "/" in said
+        if each:
+            return 1.0 / span if span else 0.0
         fitting: list[float] = []
         for i in range(at):
             found = COSMOS_REALS.match(self.lines[i])
@@ -155,7 +164,7 @@ class RecordFile:
     def _numbers(self, first: int, count: int, width: int | None) -> Iterator[float]:
         """The next `count` numbers from a line on, each `width` characters wide, or parted by spaces."""
         for number, line in enumerate(self.lines[first:], start=first + 1):
-            cells = line.split() if width is None else [line[i : i + width] for i in range(0, len(line.rstrip()), width)]
+            cells = _cells(line) if width is None else [line[i : i + width] for i in range(0, len(line.rstrip()), width)]
             for cell in cells:
                 if count == 0:
                     return
@@ -227,6 +236,11 @@ def _unit(name: Any, where: str = "") -> tuple[str, float]:
     if plain not in UNITS:
         raise ParameterError(f"{where}units {shown(name)} are not known; {near(plain, UNITS)}", "file" if where else "units")
     return UNITS[plain]
+
+
+def _cells(line: str) -> list[str]:
+    """The numbers of a line that are parted by spaces, or by their signs alone."""
+    return [n for cell in line.split() for n in (re.findall(DECIMAL, cell, re.I) if TOUCHING.fullmatch(cell) else [cell])]
 
 
 def _decimal(text: str) -> float:
