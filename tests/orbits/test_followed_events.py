@@ -185,27 +185,36 @@ def test_a_rest_without_duration_is_where_the_engine_for_one_contact_has_it() ->
     assert found.ends[1].parameter == 3.0
 
 
+def both_layers(amplitude: float) -> saltus.System:
+    """Both layers with a restitution of 0.5."""
+    model = saltus.TwoLayer(beta0=np.deg2rad(80), damping=0.1, mass_ratio=0.2)
+    load = saltus.Load(frequency=1.0, vertical=-0.5, horizontal=saltus.Harmonic(amplitude=amplitude))
+    return saltus.System(model=model, load=load, impact=saltus.NewtonImpact(e=0.5))
+
+
 @pytest.fixture(scope="module")
 def layers() -> saltus.Branch:
-    """Both layers with a restitution."""
-    model = saltus.TwoLayer(beta0=np.deg2rad(80), damping=0.1, mass_ratio=0.2)
-    load = saltus.Load(frequency=1.0, vertical=-0.5, horizontal=saltus.Harmonic(amplitude=0.4))
-    orbit = saltus.find_orbit(saltus.System(model=model, load=load, impact=saltus.NewtonImpact(e=0.5)), theta_1=0.1, theta_2=0.0)
-    return saltus.continue_orbit(orbit, "load.horizontal.amplitude", (0.15, 0.8692))
+    """A branch over the releases of both layers up to where impacts die away only as the next release comes, and beyond it."""
+    orbit = saltus.find_orbit(both_layers(0.4), theta_1=0.1, theta_2=0.0)
+    return saltus.continue_orbit(orbit, "load.horizontal.amplitude", (0.15, 0.869264))
 
 
 @pytest.mark.thorough
-def test_along_both_layers_a_branch_goes_on_beyond_where_impacts_die_away_only_as_the_next_release_comes(
-    layers: saltus.Branch,
-) -> None:
-    """Just above the range of the other tests, where special points follow each other closely."""
-    branch = saltus.continue_orbit(layers.orbits[0], "load.horizontal.amplitude", (0.15, 0.9))
-    assert kinds_of(branch)[:4] == ["SW", "SW", "RL", "CH"]
+def test_beyond_where_impacts_die_away_they_are_lost_one_by_one_at_distances_that_grow_as_the_restitution_says() -> None:
+    """Each impact of an accumulation is `e` times as fast as the one before it, so that each fold beyond the end of the
+    accumulation is 1/e times as far from it as the one before; and folds, doublings and grazings come in turn up to the bound."""
+    orbit = saltus.find_orbit(both_layers(0.4), theta_1=0.1, theta_2=0.0)
+    branch = saltus.continue_orbit(orbit, "load.horizontal.amplitude", (0.35, 0.9))
+    assert [end.parameter for end in branch.ends] == [0.35, 0.9]
+    end, *others = [point for point in branch.special if point.parameter > 0.869]
+    assert [str(point.kind) for point in (end, *others)][:-2] == ["CH", *(["LP", "PD", "GR"] * 12)]
+    folds = np.array([point.parameter - end.parameter for point in others if point.kind == "LP"])
+    assert np.abs(folds[1:8] / folds[:7] - 2.0).max() < 0.02
 
 
 def test_along_both_layers_releases_appear(layers: saltus.Branch) -> None:
     """Direct motions beside each point differ."""
-    assert kinds_of(layers) == ["SW", "SW", "RL"]
+    assert kinds_of(layers) == ["SW", "SW", "RL", "CH"]
     rests = [orbit for orbit in layers.orbits if orbit.signature.section is not None]
     assert max(orbit.defect for orbit in rests[::6]) < 1e-9
     for point in layers.special:
