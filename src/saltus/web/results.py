@@ -85,6 +85,8 @@ def differ_in_numbers(one: System, other: System) -> bool:
 def _system_of(attributes: Any) -> System:
     try:
         return System.from_dict(parsed_json(attributes["system"]))
+    except ParameterError:
+        raise  # such as of a model that is not registered
     except (KeyError, TypeError, ValueError) as error:
         raise ParameterError("the result does not say of which system it is; compute it again", "results") from error
 
@@ -100,6 +102,7 @@ def _diagram(tree: Any) -> dict[str, Any]:
         "kind": "diagram",
         "path": str(tree.attrs["path"]),
         "quantity": "amplitude",
+        "bounds": [float(bound) for bound in tree.attrs["bounds"]],
         "branches": branches,
         "special": special,
         "dots": {name: _listed(dots[name].values) for name in ("parameter", "amplitude")},

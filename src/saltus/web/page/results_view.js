@@ -73,11 +73,15 @@ function axesOf(result) {
   return { x: parameterAxis(first ?? ""), y: parameterAxis(second ?? "") };
 }
 
-/** @param {ResultEntry} result @returns {import("./plot.js").Window|null} */
-function boundsOf(result) {
-  const branches = result.branches ?? [];
-  const x = rangeOf([...branches.map(({ parameter }) => parameter), result.dots?.parameter ?? [], result.x ?? []]);
-  const y = rangeOf([...branches.map(({ amplitude }) => amplitude), result.dots?.amplitude ?? [], result.y ?? []]);
+/** All of a result; of a diagram what lies in the range of its study. @param {ResultEntry} result @returns {import("./plot.js").Window|null} */
+export function boundsOf(result) {
+  const [low, high] = result.bounds ?? [-Infinity, Infinity];
+  const parts = [...(result.branches ?? []), ...(result.dots ? [result.dots] : [])].map(({ parameter, amplitude }) => {
+    const inside = parameter.flatMap((value, i) => (value >= low && value <= high ? [i] : []));
+    return { xs: inside.map((i) => parameter[i] ?? NaN), ys: inside.map((i) => amplitude[i] ?? NaN) };
+  });
+  const x = rangeOf([...parts.map(({ xs }) => xs), result.x ?? [], result.bounds ?? []]);
+  const y = rangeOf([...parts.map(({ ys }) => ys), result.y ?? []]);
   return x && y ? [x.low, x.high, y.low, y.high] : null;
 }
 

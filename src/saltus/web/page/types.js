@@ -56,6 +56,7 @@
  * @property {Numbers} [values]  All numbers of the system of which it is.
  * @property {string} [path]
  * @property {string} [quantity]
+ * @property {[number, number]} [bounds]  The range of the study, beyond which loops may go on.
  * @property {ResultBranch[]} [branches]
  * @property {SpecialPoint[]} [special]
  * @property {{parameter: number[], amplitude: number[]}} [dots]
