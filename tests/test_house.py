@@ -263,7 +263,7 @@ CEILINGS = {
     "files in the import closure of simulate": 64,
     "files that the architecture page names for a motion": 13,
     "isinstance of equations": 1,
-    "asking a model of which class it is": 40,
+    "asking a model of which class it is": 23,
     "arguments of a compiled function": 6,
     "public names behind doors": 440,
     "tuned numbers": 523,

@@ -63,7 +63,7 @@ class KnownAttractors:
         """The label of the attractor on which each motion ends, or WAITING or UNDECIDED, (n,)."""
         labels = np.full(len(ends), WAITING)
         for row in np.flatnonzero(ends.rest):
-            labels[row] = self.add_rest(self._rest_state(ends.last[row]))
+            labels[row] = self.add_rest(rest_state(self.system, ends.last[row]))
         if ends.ended.any():
             labels[ends.ended] = UNDECIDED
             self.reasons.append(f"{int(ends.ended.sum())} motions are ended by a margin of the model or cannot go on")
@@ -100,11 +100,6 @@ class KnownAttractors:
     def _fail(self, reason: str) -> int:
         self.reasons.append(reason)
         return UNDECIDED
-
-    def _rest_state(self, last: np.ndarray) -> np.ndarray:
-        """The state in which a motion with this last state rests: the contact or, with several contacts or frictions, this
-        state."""
-        return last if self.system.model.holds_coordinates else rest_state(self.system)
 
     def add_rest(self, state: np.ndarray) -> int:
         """The label of rest in a state (d,)."""
@@ -161,7 +156,7 @@ class KnownAttractors:
         start, longest = arguments_of(self.system, state), max(max_period, 16)
         verdict = classify(self.system, **start, periods=SETTINGS.second, max_period=longest)
         if verdict.kind is Ending.REST:
-            return self.add_rest(self._rest_state(state_of(self.system, verdict.state)))
+            return self.add_rest(rest_state(self.system, state_of(self.system, verdict.state)))
         if verdict.orbit is not None and verdict.kind is Ending.PERIODIC:
             return self.add_orbit(verdict.orbit)
         where = f"from {_shown(state)}"

@@ -25,7 +25,7 @@ from saltus.orbits import PeriodicOrbit
 from saltus.progress import Progress, part_of, silent
 from saltus.public_functions import Numbers
 from saltus.result import Result, result_dataset
-from saltus.systems import System, arguments_of, read_start, state_of
+from saltus.systems import System, arguments_of, read_start, rest_state, state_of
 
 if TYPE_CHECKING:
     import xarray
@@ -234,8 +234,7 @@ def classify(
 def _settled(case: _Case, ends: Recurrence, start: np.ndarray) -> Verdict | None:
     """The verdict on a motion from a state (d,) that has come to rest, has ended or repeats itself; None if it goes on moving."""
     if ends.rest[0] or (ends.period[0] == 1 and stays_at_rest(case.clock, ends.last[0])):
-        held, numbers = case.system.model.holds_coordinates, {"periods": round(float(ends.periods[0]))}
-        point = ends.last[0] if held else np.array([float(case.system.model.contact), 0.0])
+        numbers, point = {"periods": round(float(ends.periods[0]))}, rest_state(case.system, ends.last[0])
         cause = Reason.STANDS if case.system.model.frictions else Reason.CAPTURED
         return case.verdict(Ending.REST, cause, ends, numbers, state=arguments_of(case.system, point))
     if ends.ended[0]:

@@ -101,16 +101,17 @@ def equilibria(system: System, window: Box = PLANE) -> tuple[Equilibrium, ...]:
     check_constant(system)
     area = check_window(window, system)
     model, low, high = system.model, *area[0]
+    touches = model.has_one_contact
     found = []
     for side in model.every_side:
         grid = np.linspace(low, high, EQUILIBRIA.grid)
-        if model.has_one_contact:
+        if touches:
             grid = np.sort(np.append(grid[np.asarray(system.one_contact.gap(grid, side)) > 0.0], _beside(system, side)))
         pull = _pull(system, side)
         for place in _zeros(pull, grid[(grid >= low) & (grid <= high)]):
             values = _eigenvalues(system, place, side)
             found.append(Equilibrium(place, side, values, values[0].real <= EQUILIBRIA.neutral))
-    if model.has_one_contact and low <= float(model.contact) <= high:
+    if touches and low <= float(model.contact) <= high:
         found += _at_contact(system)
     return tuple(sorted(found, key=lambda one: one.place))
 

@@ -47,10 +47,6 @@ def _state(motion: Motion) -> list[tuple[str, str]]:
 
 
 def _events(motion: Motion) -> list[tuple[str, str]]:
-    if not (
-        motion.system.model.has_one_contact or motion.system.model.holds_coordinates
-    ):  # a model without contacts and frictions
-        return []
     impacts = motion.impacts
     last = (
         f", the last at {impacts.time[-1]:.12g} with speed {np.abs(impacts.velocity_before[-1]).max():.6g}"

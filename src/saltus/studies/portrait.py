@@ -145,7 +145,7 @@ def _states(system: System, starts: Any) -> np.ndarray:
 
 def _no_inverse(system: System) -> str:
     """Why motions cannot be followed backward through impacts; an empty text if they can."""
-    if not system.model.has_one_contact or (isinstance(system.impact, VelocityReduction) and system.impact.e > 0.0):
+    if isinstance(system.impact, VelocityReduction) and system.impact.e > 0.0:
         return ""
     return f"{type(system.impact).__name__} cannot be followed backward"
 

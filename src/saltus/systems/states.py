@@ -228,10 +228,12 @@ def within_window(system: System, points: np.ndarray, window: Window, shrunk: An
     return _held(system, states, window) if system.model.contacts else states
 
 
-def rest_state(system: System) -> np.ndarray:
-    """The state at the contacts without speed, (d,); a coordinate is 0 without contacts, and in the middle between two of
-    them."""
+def rest_state(system: System, last: np.ndarray | None = None) -> np.ndarray:
+    """The state at the contacts without speed, (d,); a coordinate is 0 without contacts, and in the middle between two of them.
+    With the last state of a motion, the state in which this motion rests, which may be any with several contacts or frictions."""
     model, names = system.model, system.model.coordinates
+    if last is not None and model.holds_coordinates:
+        return last
     state = np.zeros(2 * len(names))
     if model.sides:
         state[0] = float(model.contact)

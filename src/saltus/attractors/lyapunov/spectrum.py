@@ -92,7 +92,7 @@ def impact_factor(system: System, parameters: Mapping[str, np.ndarray]) -> np.nd
     """
     traced = trace(system)
     if traced.velocity_after is None:
-        return np.zeros(()) if system.model.holds_coordinates else np.ones(())
+        return np.zeros(()) if traced.reactions else np.ones(())
     values = [Interval(np.asarray(parameters.get(path, value), dtype=float)) for path, value in system.parameters.items()]
     product = np.ones(())
     for side in system.model.every_side:

@@ -137,8 +137,9 @@ class Recurrence:
 
     @property
     def slowest(self) -> np.ndarray:
-        """The least speed before an impact over the motion's period, (n,); 0 without impacts."""
-        assert self.speeds is not None
+        """The least speed before an impact over the motion's period, (n,); 0 without impacts, and where it was not sampled."""
+        if self.speeds is None:
+            return np.zeros(len(self))
         least = np.nanmin(np.where(self.within_period, self.speeds, np.nan), axis=1, initial=np.inf)
         return np.asarray(np.where(np.isfinite(least), least, 0.0))
 
@@ -208,7 +209,8 @@ def find_recurrence(
         Called with the fraction done.
     """
     limits = limits_of(system, ())
-    sampled = {Sample.STATE: kept != 0, Sample.EXTREMA: extrema, Sample.IMPACT_COUNT: impact_count, Sample.SPEED: speed}
+    sampled = {Sample.STATE: kept != 0, Sample.EXTREMA: extrema, Sample.IMPACT_COUNT: impact_count}
+    sampled[Sample.SPEED] = speed and system.model.names_its_contacts
     size = periods if kept is None else kept
     options = EnsembleOptions(
         tol=tol,

@@ -68,7 +68,7 @@ class OneContactEquations(OrbitEquations):
             return base.with_signature(Signature((), periods)), state_of(base.system, motion.state)
         impacts = once.impacts
         # with two sides the number of impacts is even: an impact near the section may have been counted twice, or not at all
-        count = len(impacts) - (len(impacts) % 2 if len(base.system.model.sides) == 2 else 0)
+        count = len(impacts) - len(impacts) % len(base.system.model.every_side)
         if not count:
             signature = Signature((), periods, False, once.side)
             return base.with_signature(signature), state_of(base.system, motion.state)
@@ -77,10 +77,15 @@ class OneContactEquations(OrbitEquations):
         unknowns = np.stack([impacts.time[:count] * base.frequency(base.values), rate], axis=1).ravel()
         return base.with_signature(Signature(sides, periods)), unknowns
 
+    @property
+    def has_contact(self) -> bool:
+        """Whether the equations of the motion have a gap."""
+        return self._run.trace.gap is not None
+
     @cached_property
     def passes_contact(self) -> bool:  # type: ignore[override]
         """Whether the contact is no singularity for any values of the parameters at `paths`, so that orbits pass through it."""
-        if self.signature.sides or not self.system.model.has_one_contact:
+        if self.signature.sides or not self.has_contact:
             return False
         values = self._values.copy()
         values[self._places] = 0.0  # The answer holds for all of them, and is then computed once.
@@ -111,7 +116,7 @@ class OneContactEquations(OrbitEquations):
         if signature.symmetric or n % 2 or (odd and not mirrored):
             return None
         if n == 0:
-            if odd and self.system.model.has_one_contact and not self.passes_contact:
+            if odd and self.has_contact and not self.passes_contact:
                 return None  # such an orbit stays on one side, and its image on the other one
             found = self.halved.evaluate(unknowns, solution.values)
             return None if found is None else np.stack([unknowns, unknowns + found.residual])

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from saltus.flow import EventCode, Motion, contact_pull, modes_of
+from saltus.flow import EventCode, EventKind, Motion, contact_pull, modes_of
 from saltus.systems import System, reactions, stick_margins
 
 SAMPLES = 33  # in each step; minima of parabolas through them have errors of the fourth power of their distance
@@ -49,6 +49,10 @@ class SideModes:
 
     def __init__(self, system: System) -> None:
         self.system = system
+
+    def needs_whole(self, motion: Motion) -> bool:
+        """Whether equations from event to event are not enough: where it rests, or where parts may hold single coordinates."""
+        return len(motion.events.of(EventKind.REST)) > 0
 
     def numbers(self, side: np.ndarray) -> np.ndarray:
         """The numbers of the modes, from 1 on: 2 at rest, 1 and 3 on the sides -1 and +1."""
@@ -89,6 +93,14 @@ class SideModes:
         """Times and speeds of the impacts, (n, 2); if several contacts close at one instant, each has its own row."""
         return np.column_stack([motion.impacts.time, np.abs(motion.impacts.velocity_before)])
 
+    def rests(self, events: Sequence[Any], times: Sequence[float], period: float) -> list[tuple[float, float]]:
+        """When a motion with these events, of a period, leaves each rest at a single contact, and when it comes to the next."""
+        landed, pairs = [time for event, time in zip(events, times, strict=True) if event.kind == EventCode.HELD], []
+        for event, time in zip(events, times, strict=True):
+            if event.kind == EventCode.RELEASE:
+                pairs.append((time, min(later if later > time else later + period for later in landed)))
+        return pairs
+
     def gaps(self, side: np.ndarray) -> list[GapAlong]:
         """The gaps of the contacts; that of a single contact on each side."""
         one = self.system.one_contact
@@ -110,6 +122,9 @@ class SideModes:
 
 class ContactModes(SideModes):
     """How motions with several contacts or frictions are read, whose modes are 1 plus the bits that `modes_of` reads."""
+
+    def needs_whole(self, motion: Motion) -> bool:
+        return True
 
     def numbers(self, side: np.ndarray) -> np.ndarray:
         return side
@@ -169,6 +184,9 @@ class ContactModes(SideModes):
             rates = np.abs(impacts.velocity_before[:, names.index(contact.coordinate)])
             speeds[i] = np.where(impacts.side >> i & 1 == 1, rates, math.inf)
         return speeds
+
+    def rests(self, events: Sequence[Any], times: Sequence[float], period: float) -> list[tuple[float, float]]:
+        return []
 
     def gaps(self, side: np.ndarray) -> list[GapAlong]:
         names, pairs = self.system.model.coordinates, zip(self.system.contact_model.contacts, self.closed(side), strict=True)

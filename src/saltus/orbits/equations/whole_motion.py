@@ -19,8 +19,6 @@ import numpy as np
 from saltus.continuation import Bounds, Cut, End, TestFunction, Zero
 from saltus.errors import MotionError, SaltusError
 from saltus.flow import (
-    EventCode,
-    EventKind,
     Motion,
     MotionRequest,
     Program,
@@ -84,8 +82,7 @@ class WholeMotionEquations(OrbitEquations):
     def read(cls, base: OrbitEquations, motion: MotionToRead) -> tuple[OrbitEquations, np.ndarray] | None:
         """With a section chosen along the motion, and the motion's state there."""
         system, twice, periods = base.system, motion.twice, motion.periods
-        rests = system.model.holds_coordinates or len(twice.events.of(EventKind.REST)) > 0
-        if not (rests and twice.phase_known) or twice.limit is not None:
+        if not (modes_in(system).needs_whole(twice) and twice.phase_known) or twice.limit is not None:
             return None
         end = twice.start + motion.duration
         within = (twice.start < twice.events.times) & (twice.events.times < end)
@@ -111,14 +108,8 @@ class WholeMotionEquations(OrbitEquations):
         return times * self.frequency(solution.values), speeds
 
     def rests(self, solution: Solution) -> np.ndarray:
-        if self.system.model.holds_coordinates:
-            return np.empty((0, 2))
-        found, pairs = events_of(solution.evaluation), list[tuple[float, float]]()
-        landed = [time for event, time in zip(found.events, found.times, strict=True) if event.kind == EventCode.HELD]
-        for event, time in zip(found.events, found.times, strict=True):
-            if event.kind == EventCode.RELEASE:
-                pairs.append((time, min(later if later > time else later + found.period for later in landed)))
-        return np.array(pairs).reshape(-1, 2)
+        found = events_of(solution.evaluation)
+        return np.array(modes_in(self.system).rests(found.events, found.times, found.period)).reshape(-1, 2)
 
     def counted_impacts(self, solution: Solution) -> int:
         return events_of(solution.evaluation).impact_count // (2 if self.signature.symmetric else 1)

@@ -166,7 +166,7 @@ def cells(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, n
 def computed(request: ChartRequest) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """The variables of a chart with a row for each of its cells, and its motions, of dtype `motion_type`."""
     settled, judged, motions = stable_motions(request)
-    columns = table(motions, len(settled.captured), request.variables, request.system.model.names_its_contacts) | {
+    columns = table(motions, len(settled.captured), request.variables, request.told_by_speed) | {
         "rest": settled.captured > 0,
         "tiny": settled.tiny,
         **_verdicts(settled, judged),

@@ -91,6 +91,11 @@ class ChartRequest:
         return state_names(self.system.model.coordinates)
 
     @property
+    def told_by_speed(self) -> bool:
+        """Whether motions are told apart by their slowest impact too, as their extrema do not tell which contacts they hit."""
+        return self.system.model.names_its_contacts
+
+    @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns."""
         return len(self.vertical), len(self.horizontal)
@@ -176,7 +181,7 @@ class ChartRequest:
             ("motion_impact_count", "i4", "1", each, "impacts in a period of each motion"),
             *((f"motion_{name}", "f8", unit, each, f"{name} of each motion at phase 0") for name in self.variables),
         ]
-        if model.names_its_contacts:
+        if self.told_by_speed:
             rows.append(("motion_slowest", "f8", unit, each, "least speed of an impact of each motion, 0 without impacts"))
         limits = amplitude_limits(self.system)
         rows += [(f"beyond_{limit.name}", "?", "1", (), f"the largest motion passes {limit.meaning}") for limit in limits]

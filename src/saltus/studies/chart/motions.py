@@ -73,7 +73,6 @@ def motions_later(
     last states are extrapolated, so that the next stage begins there, and its extrema are those of the period with which it
     seems to settle: the one of the extrapolation or, with `slow`, the one after which it returns within this share of its size.
     """
-    several = system.model.names_its_contacts
     ends = find_recurrence(
         system,
         motions["state"],
@@ -84,7 +83,7 @@ def motions_later(
         kept=kept,
         extrema=True,
         impact_count=True,
-        speed=several,
+        speed=True,
         tol=tol,
     )
     ahead, period = ends.last, np.zeros(len(ends), dtype=int)
@@ -97,7 +96,7 @@ def motions_later(
     seen = replace(ends, period=np.where(ends.unsettled, period, ends.period))
     later, high, low = motions.copy(), seen.highest, -seen.lowest
     later["state"], later["period"] = np.where(ends.unsettled[:, None], ahead, ends.last), seen.period
-    later["impact_count"], later["slowest"] = seen.impact_count, seen.slowest if several else 0.0
+    later["impact_count"], later["slowest"] = seen.impact_count, seen.slowest
     later["amplitude"], later["other"] = np.maximum(high, low), np.minimum(high, low)
     return later, ends
 

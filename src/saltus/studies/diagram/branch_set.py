@@ -13,6 +13,7 @@ from saltus.progress import Progress, part_of, silent
 from saltus.studies.chart.motions import motion_type
 from saltus.studies.diagram.diagram_work import DiagramWork, Request
 from saltus.studies.diagram.simulated import SimulatedMotions
+from saltus.systems import System
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ class PlacedBranch:
     def columns(self) -> np.ndarray:
         """Parameter, highest, lowest, stability, period, impacts and slowest impact of each point, (7, n)."""
         rows = [
-            (value, o.highest, o.lowest, o.stable, o.period, o.impact_count, _slowest(o))
+            (value, o.highest, o.lowest, o.stable, o.period, o.impact_count, _seen(o)[2])
             for value, o in zip(self.branch.parameters.tolist(), self.branch.orbits, strict=True)
         ]
         return np.array(rows, dtype=float).reshape(-1, 7).T
@@ -59,8 +60,7 @@ class PlacedBranch:
 
     @cached_property
     def stable_ends(self) -> np.ndarray:
-        """Where stability changes along the branch: the indices of the special points there, which are not stable themselves, or
-        of the last stable points where there is none, (n,)."""
+        """Indices of the special points at which stability changes or, where there is none, of the last stable ones, (n,)."""
         stable, special = self.columns[3] > 0, np.isin(self.columns[0], [each.parameter for each in self.branch.special])
         before = np.flatnonzero(stable[:-1] != stable[1:])
         last = np.where(stable[before], before, before + 1)
@@ -165,16 +165,15 @@ def _lagrange(nodes: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarr
     return result
 
 
-def _slowest(orbit: PeriodicOrbit) -> float:
-    """The least speed of an impact of an orbit, at least `PLACEMENT.slow`; 0 for models with one contact, as motions have it."""
-    if not orbit.system.model.names_its_contacts:
-        return 0.0
-    return max(orbit.slowest if np.isfinite(orbit.slowest) else 0.0, PLACEMENT.slow)
+def _least_speed(system: System) -> float:
+    """The least speed of an impact by which motions and orbits are told apart; 0 where motions are told by their extrema."""
+    return PLACEMENT.slow if system.model.names_its_contacts else 0.0
 
 
 def _seen(orbit: PeriodicOrbit) -> np.ndarray:
     """The quantities by which motions and orbits are compared: the extrema and the slowest impact."""
-    return np.array([orbit.highest, orbit.lowest, _slowest(orbit)])
+    least = _least_speed(orbit.system)
+    return np.array([orbit.highest, orbit.lowest, max(orbit.slowest, least) if least and orbit.slowest < np.inf else least])
 
 
 def stable_motions(branches: list[PlacedBranch], grid: np.ndarray, dimension: int) -> np.ndarray:
@@ -206,7 +205,7 @@ def placed(motions: SimulatedMotions, branches: list[PlacedBranch], mirrored: bo
         Whether a motion also lies on a branch if its mirror image does.
     """
     result = np.zeros(len(motions), dtype=bool)
-    least = PLACEMENT.slow if branches and branches[0].branch.orbits[0].system.model.names_its_contacts else 0.0
+    least = _least_speed(branches[0].branch.orbits[0].system) if branches else 0.0
     every = np.stack([motions.highest, motions.lowest, np.maximum(motions.slowest, least)], axis=1)
     sizes = np.maximum(motions.amplitude, PLACEMENT.least)
     low, high, periods = motions.value.min(initial=np.inf), motions.value.max(initial=-np.inf), set(motions.period.tolist())

@@ -156,7 +156,7 @@ def followed(
         kept=SETTINGS.kept,
         extrema=True,
         impact_count=True,
-        speed=system.model.names_its_contacts,
+        speed=True,
         tol=SETTINGS.tol,
         progress=progress,
     )
@@ -180,7 +180,7 @@ def _motions(system: System, values: np.ndarray, ends: Recurrence) -> SimulatedM
         impact_count=ends.impact_count,
         highest=highest,
         lowest=lowest,
-        slowest=np.zeros(len(ends)) if ends.speeds is None else ends.slowest,
+        slowest=ends.slowest,
         states=np.where(shown[..., None], ends.states, np.nan),
         peaks=np.where(shown, np.abs(ends.extrema).max(axis=2), np.nan),
     )
