@@ -69,7 +69,7 @@ def group(values, order):
     return Few(values.reshape(-1), PLACES, Order(order), np.zeros(1, FLAGS), np.zeros(WIDTH, ROW))
 
 
-@njit(types.void(FEW), **OPTIONS)
+@njit(**OPTIONS)
 def find(few):
     lanes = shared(few)
     h, sign, series = lanes.step, lanes.sign, lanes.positions[0]
@@ -81,7 +81,7 @@ def find(few):
     lanes.speed = speed
 
 
-@njit(types.void(FEW), **OPTIONS)
+@njit(**OPTIONS)
 def find_short(few):
     lanes = shared(few)
     h, sign, series = lanes.step, lanes.sign, lanes.positions[0]
@@ -96,7 +96,7 @@ def find_short(few):
     lanes.certain = select(mask(certain), splat(1.0), splat(0.0))
 
 
-@njit(types.void(types.float64[::1]), **OPTIONS)
+@njit(**OPTIONS)
 def rough(m):
     store(m, 1, rough_log2(load(m, 0)))
     store(m, 2, rough_exp2(rough_log2(load(m, 0))))
