@@ -13,7 +13,8 @@ from typing import Any
 from saltus.errors import SaltusError, shown
 from saltus.systems import System, numbers
 
-MARK, OTHER = "{value}", "{other}"  # stand in a sentence for the value, and for another number that bounds it
+# They stand in a sentence for the value, for the value in six digits, and for another number that bounds it, in six digits.
+MARK, SHORT, OTHER = "{value}", "{short}", "{other}"
 # Sizes of the values that are tried, odd in their digits so that no sentence has them by chance; Python's hint at degrees begins
 # and ends near the second and the fifth of them.
 TRIED = (0.0070173, 3.2000173, 7.0170173, 70.170173, 360.00173, 7017.0173, 7.0170173e6, 7.0170173e12)
@@ -25,7 +26,7 @@ def accepted(system: System) -> dict[str, dict[str, Any]]:
 
     * `end`, the last value, and `taken`, whether it is taken itself;
     * `of`, the path of the number that it is, if another number of the system bounds this one;
-    * `said`, pairs of a distance beyond the end and the sentence that holds from there on;
+    * `said`, pairs of a value and the sentence that is said from there on, the first of them from the end on;
 
     and `whole`, the sentence that refuses a fraction, for numbers that are whole.
 
@@ -81,15 +82,26 @@ class _NumberBounds:
         return {"end": end, "taken": self.refusal(end) is None}
 
     def _said(self, end: float, tried: list[float]) -> list[list[Any]]:
-        """The sentences by the distance from the end, each where it begins."""
+        """The sentences beyond the end, each with the value from which on it is said."""
         found: list[list[Any]] = []
+        before = end
         for x in sorted(tried, key=lambda x: abs(x - end)):
-            said = self.refusal(x)
-            written = int(x) if self.whole else x
-            marked = said and said.replace(shown(written), MARK).replace(f"{x:g}", MARK)
+            marked = self._marked(x)
             if marked and (not found or found[-1][1] != marked):
-                found.append([abs(x - end) if found else 0.0, marked])
+                found.append([self._change(before, x, marked) if found else end, marked])
+            before = x
         return found
+
+    def _change(self, before: float, x: float, marked: str) -> float:
+        """From where on a sentence is said, by halving."""
+        while not self.whole and (middle := 0.5 * (before + x)) not in (before, x) and abs(x - before) > 1e-12:
+            before, x = (before, middle) if self._marked(middle) == marked else (middle, x)
+        return x
+
+    def _marked(self, x: float) -> str | None:
+        """Python's sentence to a value, with marks for the value."""
+        said = self.refusal(x)
+        return said and said.replace(shown(int(x) if self.whole else x), MARK).replace(f"{x:g}", SHORT)
 
     def _follow(self, bound: dict[str, Any]) -> None:
         """Find out whether another number of the system is the bound: then the bound moves with it."""

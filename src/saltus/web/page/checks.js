@@ -5,22 +5,28 @@
 
 const ASIDE = 60; // A slider keeps this share of its range from an end that is not taken.
 
-/** What Python says to these numbers: null, or the first refusal. @param {NumberEntry[]} entries @param {Record<string, number>} values */
+/** What Python says to these numbers: null, or the first refusal; how two numbers lie to one another is looked at last. @param {NumberEntry[]} entries @param {Record<string, number>} values */
 export function refusedNumbers(entries, values) {
+  /** @type {{where: string, message: string}|null} */
+  let between = null;
   for (const entry of entries) {
-    const message = refusedNumber(entry, values);
-    if (message) return { where: entry.path, message };
+    const refused = refusedNumber(entry, values);
+    if (!refused) continue;
+    const said = { where: entry.path, message: refused.message };
+    if (!refused.between) return said;
+    between ??= said;
   }
-  return null;
+  return between;
 }
 
-/** @param {NumberEntry} entry @param {Record<string, number>} values */
+/** @param {NumberEntry} entry @param {Record<string, number>} values @returns {{message: string, between: boolean}|null} */
 function refusedNumber(entry, values) {
   const value = values[entry.path] ?? NaN;
   const { least, most, whole } = entry.accepted ?? {};
-  if (!Number.isFinite(value)) return `${entry.path} must be finite, got ${pythonRepr(value)}`;
-  if (whole && !Number.isInteger(value)) return whole.replace("{value}", pythonRepr(value));
-  return (least && beyond(least, value, -1, values)) || (most && beyond(most, value, 1, values)) || null;
+  const alone = (/** @type {string} */ message) => ({ message, between: false });
+  if (!Number.isFinite(value)) return alone(`${entry.path} must be finite, got ${pythonRepr(value)}`);
+  const outside = (least && beyond(least, value, -1, values)) || (most && beyond(most, value, 1, values));
+  return outside || (whole && !Number.isInteger(value) ? alone(whole.replace("{value}", pythonRepr(value))) : null);
 }
 
 /** @param {Bound} bound @param {number} value @param {number} sign @param {Record<string, number>} values */
@@ -28,8 +34,17 @@ function beyond(bound, value, sign, values) {
   const end = bound.of === undefined ? bound.end : (values[bound.of] ?? bound.end);
   const distance = sign * (value - end);
   if (distance < 0 || (distance === 0 && bound.taken)) return null;
-  const said = bound.said.reduce((last, [from, sentence]) => (from <= distance ? sentence : last), bound.said[0]?.[1] ?? "");
-  return said.replace("{value}", pythonRepr(value)).replace("{other}", String(Number(end.toPrecision(6))));
+  const said = bound.said.slice(1).reduce((last, [from, sentence]) => (sign * (value - from) >= 0 ? sentence : last), bound.said[0]?.[1] ?? "");
+  const message = said.replace("{value}", pythonRepr(value)).replace("{short}", pythonShort(value)).replace("{other}", pythonShort(end));
+  return { message, between: said.includes("{other}") };
+}
+
+/** A number as Python writes it in six digits. @param {number} value */
+function pythonShort(value) {
+  const [digits = "", exponent = "0"] = value.toExponential(5).split("e");
+  const power = Number(exponent);
+  if (power >= -4 && power < 6) return String(Number(value.toPrecision(6)));
+  return `${Number(digits)}e${power < 0 ? "-" : "+"}${String(Math.abs(power)).padStart(2, "0")}`;
 }
 
 /** A number as Python writes it. @param {number} value */
