@@ -14,6 +14,7 @@ from saltus.notebook import LineBelowCell
 
 Progress = Callable[[float, str], object]
 LINE = LineBelowCell()
+LOOK_INTERVAL = 0.1  # seconds between looks at Ctrl-C, and at the progress of other threads
 
 
 def silent(fraction: float, what: str) -> None:

@@ -59,7 +59,7 @@ def share_interval(number: int, sample: int) -> tuple[float, float]:
 
 UNDECIDED = -1  # the label of motions that end on no known attractor
 REST = 0  # the label of rest at the contact, always
-LAST_STATES = 64  # a motion that does not settle is on a sampled set if the median distance of so many last states is small
+LAST_STATES = 64  # of a motion that does not settle, which lies on a set if their median distance is small; most that are written
 SAME_STATE = 1e-6  # two states at phase 0 this near to one another count as one, relative to their size or to 1
 
 
@@ -296,9 +296,6 @@ class Attractors(Result):
         return f"Attractors({len(self.members)} from {len(self.states)} states, {self.undecided} of them undecided{lines})"
 
 
-MOST_STATES = 64  # states at phase 0 that are written of each attractor
-
-
 def attractors_dataset(found: Attractors) -> xarray.Dataset:
     """The table of the attractors, with their states at phase 0, and the initial states with the labels of their ends."""
     import xarray
@@ -366,10 +363,10 @@ def attractor_columns(system: System) -> dict[str, tuple[str, str, str]]:
 
 def attractor_table(members: tuple[Attractor, ...], system: System) -> dict[str, Any]:
     """The variables over (attractor,), and those of the states at phase 0 over (attractor, state)."""
-    most = max([1, *(min(len(m.states), MOST_STATES) for m in members)])
+    most = max([1, *(min(len(m.states), LAST_STATES) for m in members)])
     states = np.full((len(members), most, system.dimension), np.nan)
     for row, member in zip(states, members, strict=True):
-        row[: len(member.states)] = member.states[:MOST_STATES]
+        row[: len(member.states)] = member.states[:LAST_STATES]
     columns: dict[str, Any] = {}
     for key, (part, units, text) in attractor_columns(system).items():
         values = np.array([getattr(member, part) for member in members], dtype=int if key == "period" else float)

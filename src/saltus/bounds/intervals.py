@@ -19,7 +19,6 @@ from saltus.taylor import FUNCTIONS, Expr, ordered
 ROUNDING = 2.0**-51  # relative, four times that of + - * / and sqrt: a literal factor such as 1/3 may be rounded too
 LIBRARY = 2.0**-48  # relative, of the elementary functions: NumPy promises 4 units in the last place
 SLACK = 1e-9  # relative, far above the rounding of the few steps after the intervals
-TURN = 2 * math.pi
 EXACT_FACTORS = (0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # factors that do not round
 
 
@@ -167,10 +166,10 @@ def _wave(function: Any, peak: float) -> Callable[[Interval], Interval]:
         at_lo, at_hi = function(x.lo), function(x.hi)
 
         def passes(point: float) -> Any:
-            return np.floor((x.hi - point) / TURN + LIBRARY) >= np.ceil((x.lo - point) / TURN - LIBRARY)
+            return np.floor((x.hi - point) / math.tau + LIBRARY) >= np.ceil((x.lo - point) / math.tau - LIBRARY)
 
         result = outward(np.minimum(at_lo, at_hi), np.maximum(at_lo, at_hi), LIBRARY)
-        full_turn = x.hi - x.lo >= TURN  # False where a bound is NaN, so that the result stays NaN
+        full_turn = x.hi - x.lo >= math.tau  # False where a bound is NaN, so that the result stays NaN
         # Over a full turn the bounds are -1 and 1, also where the ends are infinite and the function there is NaN.
         result.lo, result.hi = (np.where(full_turn, 0.0, end) for end in (result.lo, result.hi))
         low = np.where(full_turn | passes(peak + math.pi), -1.0, np.maximum(result.lo, -1.0))

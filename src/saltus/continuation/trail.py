@@ -27,7 +27,6 @@ class TrailSettings:
 
 SETTINGS = TrailSettings()
 GRID = np.linspace(0.0, 1.0, SETTINGS.grid)
-PARABOLA = GRID * (1.0 - GRID)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,10 +158,10 @@ def _where_to_look(a: TrailPoint, b: TrailPoint, near: Sequence[TrailPoint]) -> 
         room = np.where(signs > 0, 4.0 * np.minimum(np.abs(begin), np.abs(end)), np.abs(rise))
         swing = np.abs(bend) + 1.25 * np.abs(lever).max() * (np.abs(twist) + unsure)
         doubtful = (room <= swing) & (signs != 0) & np.isfinite(swing)
-    worst, place = 0.0, None
+    worst, place, parabola = 0.0, None, GRID * (1.0 - GRID)
     for row in np.flatnonzero(doubtful):
-        cubic = begin[row] + rise[row] * GRID - PARABOLA * (bend[row] + twist[row] * lever)
-        margin = SETTINGS.doubt * PARABOLA * unsure[row] * np.abs(lever)
+        cubic = begin[row] + rise[row] * GRID - parabola * (bend[row] + twist[row] * lever)
+        margin = SETTINGS.doubt * parabola * unsure[row] * np.abs(lever)
         if signs[row] > 0:
             least = np.sign(begin[row]) * cubic - margin
             k = int(np.argmin(least))

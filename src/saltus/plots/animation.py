@@ -19,7 +19,6 @@ from saltus.plots.motion import LINES, PAIRS, arcs, coordinates
 from saltus.progress import Progress, silent
 from saltus.systems import drawing_of
 
-RESOLUTION_OF_FILMS = 110  # dots per inch: 820 x 330 points, which a page shows without scaling
 LOOKS: dict[str, dict[str, Any]] = {
     "ground": {"color": LOOK.ink, "lw": 1.2},
     "wall": {"color": LOOK.ink, "lw": 2.4},
@@ -96,7 +95,7 @@ def animate(
         def seen(number: int, total: int) -> object:
             return progress(number / max(total, 1), f"picture {number + 1} of {total}")
 
-        made.save(file, writer=writer, dpi=RESOLUTION_OF_FILMS, progress_callback=seen)
+        made.save(file, writer=writer, dpi=110, progress_callback=seen)  # 820 x 330 points, which a page shows without scaling
     progress(1.0, "film")
     return file
 

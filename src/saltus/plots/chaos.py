@@ -126,9 +126,6 @@ def _draw_map(ax: Axes, dataset: Any, dims: list[str]) -> Axes:
     return ax
 
 
-LINE_LENGTH = 62  # characters of the sentence above a picture of one column
-
-
 @drawing
 def draw_verdict(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column) -> Axes:
     """Draw the states at phase 0 on which a motion ends, its orbit if there is one, and the verdict's sentence; returns `ax`."""
@@ -153,7 +150,7 @@ def draw_verdict(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.si
     ax.legend(loc="best", markerscale=4.0 if many else 1.0)
     if own:
         sentence = f"{dataset['kind'].values}: {dataset['reason'].values}".replace("+-", "\u00b1")
-        ax.set_title("\n".join(textwrap.wrap(sentence, LINE_LENGTH)), loc="left", fontsize=8)
+        ax.set_title("\n".join(textwrap.wrap(sentence, 62)), loc="left", fontsize=8)
     return ax
 
 

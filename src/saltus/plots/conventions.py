@@ -66,7 +66,6 @@ class Look:
 
 
 LOOK = Look()
-RESOLUTION = 300  # dots per inch of the PNG
 
 RC: Any = {
     "font.family": "STIXGeneral",
@@ -101,7 +100,7 @@ RC: Any = {
     "lines.solid_capstyle": "round",
     "pdf.fonttype": 42,  # all glyphs embedded, so that a publisher can edit the text
     "agg.path.chunksize": 20_000,  # a curve of a million points is drawn in parts
-    "savefig.dpi": RESOLUTION,
+    "savefig.dpi": 300,
     "figure.dpi": 100,
     "axes.formatter.use_mathtext": True,
     "axes.unicode_minus": True,

@@ -88,7 +88,6 @@ def draw_attractors_along(dataset: Any, *, ax: Axes | None = None, width: float 
     return ax
 
 
-FEIGENBAUM = 4.669201609102990  # the limit of the ratios of a cascade
 SETTLED: dict[str, Any] = {"color": LOOK.ink, "linestyle": "none", "marker": "+", "markersize": 5.0, "markeredgewidth": 0.6}
 FACES = {True: ("stable orbit", LOOK.stable, LOOK.stable, "o"), False: ("unstable orbit", "white", LOOK.unstable, "s")}
 
@@ -132,7 +131,7 @@ def draw_cascade(dataset: Any, *, ax: Axes | None = None, figure: Figure | None 
     left, right = figure.subplots(1, 2)
     _draw_doublings(left, dataset)
     periods, ratios = dataset["period"].values, dataset["ratio"].values
-    right.axhline(FEIGENBAUM, label=f"limit {FEIGENBAUM:.4f}", **LOOK.limit_line)
+    right.axhline(4.669201609102990, label="limit 4.6692", **LOOK.limit_line)  # Feigenbaum's constant
     right.plot(periods[: len(ratios)], ratios, marker="s", ms=4.0, mfc="white", **LOOK.stable_line)
     right.set_ylabel("ratio of successive distances")
     right.legend(loc="best")

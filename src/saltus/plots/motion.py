@@ -167,20 +167,17 @@ def _limit_angle(dataset: xarray.Dataset) -> float | None:
     return math.pi - model["beta0"] if model.get("type") in ("Metainterface", "TwoLayer") else None
 
 
-ENTRY_WIDTH = 18.0  # mm, of one derivative
-DARKEST = 6.0  # black would stand for this many times the largest derivative, so that numbers on the shades can be read
-
-
 @drawing
 def draw_sensitivities(dataset: Any, *, ax: Axes | None = None, width: float | None = None) -> Axes:
     """Draw the derivatives as a table of numbers, a row for each state variable at the end, darker if larger; returns `ax`."""
     derivative = np.asarray(dataset["derivative"].values, dtype=float)
     names, to = ([str(name) for name in dataset[dim].values] for dim in ("state", "to"))
-    size = (ENTRY_WIDTH * len(to) + 34.0 if width is None else width, 12.0 * len(names) + 26.0)
+    size = (18.0 * len(to) + 34.0 if width is None else width, 12.0 * len(names) + 26.0)
     ax = axes_or_new(ax, *size)
     plane = names[0], names[len(names) // 2]
     largest = float(np.nanmax(np.abs(derivative), initial=0.0)) or 1.0
-    ax.imshow(np.abs(derivative), cmap="Greys", norm=PowerNorm(0.5, 0.0, DARKEST * largest), aspect="auto")
+    # black would stand for six times the largest derivative, so that numbers on the shades can be read
+    ax.imshow(np.abs(derivative), cmap="Greys", norm=PowerNorm(0.5, 0.0, 6.0 * largest), aspect="auto")
     for (row, column), value in np.ndenumerate(derivative):
         text = f"{value:.4g}".replace("-", "\u2212") if np.isfinite(value) else "undefined"
         ax.text(column, row, text, ha="center", va="center", color=LOOK.ink)

@@ -21,8 +21,6 @@ from saltus.plots.conventions import (
     unit_in_brackets,
 )
 
-ARROWS = 0.6  # window widths between arrows along a motion
-
 
 @drawing
 def draw_plane(dataset: Any, *, ax: Axes | None = None, width: float = 1.5 * LOOK.single_column) -> Axes:
@@ -42,7 +40,7 @@ def draw_plane(dataset: Any, *, ax: Axes | None = None, width: float = 1.5 * LOO
     motions = list(zip(dataset[name].values, dataset["velocity"].values, strict=True))
     for x, v in lines_apart(motions, window) if dataset.attrs.get("starts") == "spread" else motions:
         ax.plot(x, v, color=LOOK.stable, lw=0.7, zorder=2)
-        draw_arrows(ax, x, v, ARROWS)
+        draw_arrows(ax, x, v, 0.6)  # window widths between arrows
     for x, v in zip(dataset[f"separatrix_{name}"].values, dataset["separatrix_velocity"].values, strict=True):
         ax.plot(x, v, zorder=3, **LOOK.separatrix_line)
     stable = dataset["stable"].values.astype(bool)

@@ -265,17 +265,7 @@ def line_labels(branches: list[Any]) -> list[tuple[str, list[dict[str, Any]]]]:
 POINTS: dict[str, Any] = {"color": LOOK.ink, "linestyle": "none", "marker": ".", "markeredgewidth": 0.0, "rasterized": True}
 
 
-@dataclass(frozen=True)
-class StateSettings:
-    """Which stroboscopic states are drawn, and how large: their size follows from the step between values."""
-
-    finest: float = 1.3  # The least size of a point.
-    coarsest: float = 3.5  # The largest size of a point.
-    at_rest: float = 1e-9  # A motion that stays within this of the contact for a period is at rest, and left out.
-
-
-DRAWN_STATES = StateSettings()
-
+AT_REST = 1e-9  # A motion that stays within this of the contact for a period is at rest, and its states are left out.
 
 QUANTITIES = ("amplitude", "highest", "lowest", "slowest")  # those of branches, special points and simulated motions
 
@@ -352,10 +342,10 @@ def draw_stroboscopic_states(ax: Any, tree: Any) -> None:
     """The states at phase 0 of the load of the simulated motions from every start, period after period."""
     section = tree["stroboscopic"]
     draw_bands(ax, tree)
-    moving = section["peak"].values > DRAWN_STATES.at_rest
+    moving = section["peak"].values > AT_REST
     values, places = section["value"].values[moving], section["position"].values[moving]
     low, high = ax.get_xlim()
     width = ax.get_window_extent().width / ax.figure.dpi * 72.0  # points
-    size = np.clip(0.5 * width / max(len(np.unique(values)), 1), DRAWN_STATES.finest, DRAWN_STATES.coarsest)
+    size = np.clip(0.5 * width / max(len(np.unique(values)), 1), 1.3, 3.5)
     ax.plot(values, places, markersize=size, **POINTS)
     ax.set_xlim(low, high)

@@ -13,7 +13,6 @@ from saltus.plots.conventions import LOOK, axes_or_new, drawing
 BAR = "#5f6b76"
 FORCE = LOOK.unstable
 GROUND = LOOK.limit
-HEIGHTS_AT = 2.12  # the abscissa of the dimension lines of both heights, in lengths l
 ORIGIN = np.array([-0.95, -0.55])  # of the inertial frame, from the lower left hinge
 ARROW: dict[str, Any] = {"arrowstyle": "-|>,head_width=0.2,head_length=0.45", "lw": 1.1, "shrinkA": 0, "shrinkB": 0}
 
@@ -53,7 +52,7 @@ def draw_cell(ax: Any, cell: Any, labels: Literal["", "undeformed", "deformed"] 
         _label_undeformed(ax, points, cell)
     elif labels == "deformed":
         _label_deformed(ax, points, cell)
-        _label_heights(ax, points, HEIGHTS_AT)
+        _label_heights(ax, points, 2.12)
         _draw_frames(ax, ORIGIN, points["lower_left"])
     return points
 

@@ -34,7 +34,6 @@ class LyapunovSettings:
     look_back: int = 160  # The forcing periods after the run within which it is tested whether a motion repeats itself.
     lossless: float = 1.0 - 1e-14  # A product of impact factors below this counts as below 1.
     largest_group: int = 256  # The most motions that one thread follows together: enough to make the cost of a call small.
-    look: float = 0.2  # The time between checks for Ctrl-C and reports of progress, s.
     distance: float = 1e-7  # Of two trajectories: far above the error of a period, small enough for the map to be linear.
     accuracy: float = 1e-5  # The error of the exponent from two trajectories that their own numerical errors cause.
     tolerance: float = 1e-14  # The error of a step of the two trajectories.
@@ -46,7 +45,6 @@ class LyapunovSettings:
     # The smallest factor of the distance of a pair that is measured by the pair: the distance is then 100 times the error of a
     # step. Smaller factors are measured by derivatives.
     least_of_pair: float = 1e-4
-    every: int = 16  # The number of periods between calls of the progress.
 
 
 LYAPUNOV = LyapunovSettings()

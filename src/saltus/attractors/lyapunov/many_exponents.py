@@ -26,7 +26,7 @@ from saltus.flow import (
     read_inputs,
     stop_names,
 )
-from saltus.progress import Progress, part_of, silent
+from saltus.progress import LOOK_INTERVAL, Progress, part_of, silent
 from saltus.provenance import provenance
 from saltus.public_functions import Numbers
 from saltus.systems import System
@@ -75,7 +75,7 @@ def stretch_many(
     with ThreadPoolExecutor(available_cores()) as pool:
         workers = [pool.submit(work, rows) for rows in groups]
         try:
-            while wait(workers, LYAPUNOV.look).not_done:
+            while wait(workers, LOOK_INTERVAL).not_done:
                 progress(float(done[0]) / (periods * max(1, len(states))), "derivatives")
         except BaseException:
             stopped.append(True)

@@ -126,8 +126,7 @@ def separation_growth(system: System, state: np.ndarray, periods: int, length: f
             break
         growth[p] = np.log(distance / before)
         here, away = following, apart * (LYAPUNOV.distance / distance)
-        if p % LYAPUNOV.every == LYAPUNOV.every - 1:
-            progress((p + 1) / periods, "two trajectories")
+        progress((p + 1) / periods, "two trajectories")
     return growth
 
 
@@ -328,8 +327,7 @@ class _Run:
                 if self.note is not None:
                     self.state = begin
                     return
-            if p % LYAPUNOV.every == LYAPUNOV.every - 1:
-                progress((p + 1) / len(self.areas), "derivatives")
+            progress((p + 1) / len(self.areas), "derivatives")
 
     def _advance(self, p: int, j: int, frame: np.ndarray, contraction: Contraction, tol: float) -> np.ndarray:
         """Go on over span j of period p; returns the frame at its end, orthonormal again."""

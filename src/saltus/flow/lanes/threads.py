@@ -32,7 +32,7 @@ from saltus.flow.lanes.memory import (
     MemoryPlan,
     Work,
 )
-from saltus.progress import Progress, silent
+from saltus.progress import LOOK_INTERVAL, Progress, silent
 from saltus.taylor.vectors import CACHE_LINE, WIDTH
 
 WHAT = "following the motions"  # for the progress
@@ -52,7 +52,6 @@ class ThreadSettings:
     # When a chunk is taken, at least so many chunks of its size remain for each thread: the last ones are small, so that all
     # threads end at about the same time.
     chunks_ahead: int = 2
-    look_interval: float = 0.1  # Seconds between looks at Ctrl-C and at the progress.
     most_threads: int = 256  # The most threads of all ensembles that run at the same time.
 
 
@@ -176,7 +175,7 @@ class Lanes:
         try:  # an interrupt while they are begun must stop them, too
             for control in controls:
                 workers.append(pool.submit(self._work, jobs, ends, waiting, lock, control))
-            while wait(workers, SETTINGS.look_interval).not_done:
+            while wait(workers, LOOK_INTERVAL).not_done:
                 if total > 0:
                     progress(min(1.0, sum(int(c[1]) for c in controls) / total), WHAT)
         except BaseException:

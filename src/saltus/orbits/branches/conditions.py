@@ -24,7 +24,7 @@ from saltus.flow import SegmentColumn
 from saltus.orbits.branches.beyond_grazing import removed
 from saltus.orbits.branches.orbit_curve import curve_test, scaled_determinant
 from saltus.orbits.branches.special_point import SpecialKind
-from saltus.orbits.equations.contract import OrbitEquations, OrbitEvaluation, Solution
+from saltus.orbits.equations.contract import FARTHEST, OrbitEquations, OrbitEvaluation, Solution
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import TOLERANCES
 
@@ -167,9 +167,6 @@ def cubic(condition: Singular, solution: Solution, at: ConditionValue) -> float:
     return (4.0 * third(step) - third(2.0 * step)) / 3.0
 
 
-CAP = 1.0  # upper limit of `room`, which would be infinite for a motion without impacts that never comes near the contact
-
-
 def curve_tests(kind: str, symmetric: bool) -> list[TestFunction]:
     """The test functions along a curve of a kind, by the codimension-two point at which each vanishes.
 
@@ -196,7 +193,7 @@ def normal_form(point: SpecialCurvePoint) -> float:
 
 
 def room(point: SpecialCurvePoint) -> float:
-    """How far the motion is from another grazing: the least of the impacts' speeds and of the gap's minima, at most `CAP`.
+    """How far the motion is from another grazing: the least of the impacts' speeds and of the gap's minima, at most `FARTHEST`.
 
     The impacts and the minimum of the grazing that the curve itself follows are left out.
     """
@@ -209,7 +206,7 @@ def room(point: SpecialCurvePoint) -> float:
         touch = point.solution.unknowns[2 * touching[0]]
         away = np.abs(np.array([phases - touch + turn * orbit.equations.closing for turn in (-1, 0, 1)])).min(axis=0)
         humps = humps[~(away < TOLERANCES.pair)]
-    return min(CAP, float(speeds.min(initial=np.inf)), float(humps.min(initial=np.inf)))
+    return min(FARTHEST, float(speeds.min(initial=np.inf)), float(humps.min(initial=np.inf)))
 
 
 def without(point: SpecialCurvePoint, closing: float) -> float:

@@ -15,7 +15,7 @@ from saltus.bounds import area_contraction
 from saltus.continuation import STEPS, Corrected, EquationCurve, Point, TestFunction
 from saltus.flow import SegmentColumn, SegmentValue
 from saltus.orbits.branches.special_point import SpecialKind, SpecialPoint, UserFunction
-from saltus.orbits.equations.contract import OrbitEquations, OrbitEvaluation, Solution
+from saltus.orbits.equations.contract import FARTHEST, OrbitEquations, OrbitEvaluation, Solution
 from saltus.orbits.orbit import PeriodicOrbit
 
 # With a multiplier above this, neighbouring motions separate so fast that an orbit cannot be solved for.
@@ -191,7 +191,7 @@ def torus(point: OrbitPoint) -> float:
             values = np.where(np.abs(values) > MULTIPLIER_ROUNDING * np.abs(values).max(), values, 0.0)
             first, second = np.triu_indices(len(values), 1)
             product = float(np.prod(values[first] * values[second] - 1.0).real)
-    return -1.0 if not math.isfinite(product) else product if abs(product) > PRODUCT_ROUNDING else 0.0
+    return -1.0 if not math.isfinite(product) else product if abs(product) > MULTIPLIER_ROUNDING else 0.0
 
 
 def _areas(maps: np.ndarray) -> np.ndarray:
@@ -230,14 +230,13 @@ def touching(point: OrbitPoint) -> float:
     through the contact."""
     orbit, extremes = point.orbit, point.evaluation.extremes
     pairs = int(extremes[:, SegmentColumn.CROSSINGS].sum()) // 2
-    return float((-1) ** pairs * min(NEAREST, orbit.clearance, orbit.shallowest))
+    return float((-1) ** pairs * min(FARTHEST, orbit.clearance, orbit.shallowest))
 
 
-PRODUCT_ROUNDING = 1e-12  # the difference of a product of multipliers from 1 that rounding makes in a system without loss
-# Multipliers smaller than the largest one by this factor are rounding errors of 0: their products with it have no meaning.
+# Multipliers smaller than the largest one by this factor are rounding errors of 0: their products with it have no meaning. In a
+# system without loss rounding makes this difference of a product of multipliers from 1.
 MULTIPLIER_ROUNDING = 1e-12
 VANISHING = 1e-4  # a complex pair of smaller modulus is a double multiplier 0: rounding moves it by the root of its size
-NEAREST = 1.0  # upper limit of the distance of an orbit from a grazing, which is infinite for one whose gap has no minimum
 
 
 CHANGES = {"decisive": True, "guides": True}  # tests whose zeros are smooth changes of stability

@@ -18,6 +18,7 @@ from saltus.orbits.signature import Signature
 from saltus.systems import System, contact_images, numbers
 from saltus.taylor import FREQUENCY, record_table
 
+FARTHEST = 1.0  # upper limit of distances of an orbit from a change, which are infinite where nothing comes near to one
 ORBIT_TOLERANCE = 1e-14  # of the segments' steps: the orbits are then exact to rounding
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from saltus.errors import MotionError
 from saltus.flow import EventCode, EventKind, Motion
+from saltus.orbits.equations.contract import FARTHEST
 from saltus.orbits.equations.sampled_motion import ONE_INSTANT, Group, SampledMotion, modes_in
 from saltus.orbits.signature import ModeChange, Signature
 from saltus.systems import System
@@ -34,8 +35,6 @@ class EventSettings:
     grows: float = 1e-6  # Impacts have not begun to die away if one is faster than its predecessor by more than this share.
     # The section is moved if it is nearer to an event than this share of the time between the events before and after it.
     section_distance: float = 0.02
-    farthest: float = 1.0  # The largest distance that is given: it would be infinite for an orbit without any minimum.
-    together: float = 1e-9  # Events nearer to each other than this share of a forcing period happen at one instant.
 
 
 SETTINGS = EventSettings()
@@ -101,7 +100,7 @@ def sequence_of(motion: Motion, sampled: SampledMotion, images: Sequence[int] | 
     if images is not None:
         events += tuple(OrbitEvent(event.kind, *modes.image(event.parts, event.mode, images)) for event in events)
         times, period = times + tuple(time + period for time in times), 2.0 * period
-    apart, groups = [SETTINGS.farthest], modes.groups(motion.position)
+    apart, groups = [FARTHEST], modes.groups(motion.position)
     for group in groups:
         own = [time for event, time in zip(events, times, strict=True) if event.parts & group.parts]
         apart += np.diff([*own, own[0] + period]).tolist() if len(own) > 1 else []
@@ -211,7 +210,7 @@ def read_signature(motion: Motion, periods: int, frequency: float) -> tuple[Sign
     """
     period = motion.system.load.period
     assert period is not None
-    changes = _mode_changes(motion, SETTINGS.together * period)
+    changes = _mode_changes(motion, ONE_INSTANT * period)
     times = np.array([time for time, _ in changes])
     start, length = motion.start, periods * period
     bounds = np.concatenate([[start], times[times < start + length], [start + length]])

@@ -17,7 +17,7 @@ SAMPLES = 33  # in each step; minima of parabolas through them have errors of th
 NEWTON_STEPS = 4  # from the largest sample of a coordinate to its extremum; each squares the error
 NARROWER = (0.3, 1e-3)  # distances between the instants at which a force is evaluated near its least sample, in those of samples
 MOST_ORDER = 24  # the highest order of a step's series
-# Events nearer to each other than this share of the motion's duration happen at one instant, and steps between them are left out.
+# Events nearer to each other than this share of the period happen at one instant, and steps between them are left out.
 ONE_INSTANT = 1e-9
 DYING = 1e-5  # Slower impacts are not listed: they belong to an accumulation.
 

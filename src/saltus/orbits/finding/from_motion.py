@@ -247,12 +247,11 @@ class NearReturnSettings:
     longest: float = 0.3  # The longest of these steps: beyond it the map is far from linear.
     converged: float = 1e-7  # Distance of a state from its image below which it is taken to be on an orbit.
     same_state: float = 1e-5  # States at one value are on the same orbit if they are this near.
-    still: float = 1e-6  # An orbit no larger than this is rest.
+    still: float = 1e-6  # An orbit no larger than this, or a motion that stays this near to the contact, is at rest.
     # An orbit with a multiplier this near to 1 belongs to a continuum of orbits at one value of the parameter, such as those of a
     # mass that no wall and no spring holds, and has no branch. Near a fold a multiplier is as near to 1 only within 1e-14 of the
     # fold's parameter.
     isolated: float = 1e-7
-    tol: float = 1e-11  # The error of a step.
     # With contacts or frictions and more state variables than this, derivatives are computed motion by motion, by the code that
     # branches need as well. The code for lanes would take longer to compile (minutes for four cells).
     in_lanes: int = 4
@@ -349,7 +348,7 @@ def _mapped(system: System, path: str, values: np.ndarray, states: np.ndarray, p
     """
     if system.model.holds_coordinates and system.dimension > NEAR_RETURNS.in_lanes:
         return _mapped_singly(system, path, values, states, period)
-    options: dict[str, Any] = {"periods": period, "sample": (), "tol": NEAR_RETURNS.tol, "sensitivities": ()}
+    options: dict[str, Any] = {"periods": period, "sample": (), "tol": RECURRENCE.tol, "sensitivities": ()}
     result = motions_from(system, states, parameters={path: values}, **options)
     return last_states(system, result), np.where(held_by_contacts(system, states)[:, None], 0.0, result["derivative"].values)
 
@@ -358,7 +357,7 @@ def _mapped_singly(
     system: System, path: str, values: np.ndarray, states: np.ndarray, period: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """As `_mapped`, one motion after the other; nan where a motion cannot be followed or has no derivatives."""
-    equations = equations_of(system, Signature((), period, section=0.0), (path,), NEAR_RETURNS.tol)
+    equations = equations_of(system, Signature((), period, section=0.0), (path,), RECURRENCE.tol)
     held = held_by_contacts(system, states)
     ends, slopes = np.full(states.shape, np.nan), np.full((*states.shape, states.shape[1]), np.nan)
     for i, (value, state) in enumerate(zip(values, states, strict=True)):

@@ -11,7 +11,7 @@ import numpy as np
 from saltus.checks import check_count, check_starts
 from saltus.errors import ParameterError
 from saltus.flow import Recurrence, find_recurrence
-from saltus.orbits.finding.from_motion import orbits_near_returns, solved_near
+from saltus.orbits.finding.from_motion import NEAR_RETURNS, orbits_near_returns, solved_near
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.verify import same_orbit
 from saltus.progress import Progress, silent
@@ -29,8 +29,6 @@ class SearchSettings:
     settling: int = 200  # Number of forcing periods for which motions are followed to settle.
     # Number of forcing periods, at the beginning of each motion and at its end, in which near returns are looked for.
     transient: int = 24
-    still: float = 1e-6  # A motion that stays this near to the contact is at rest.
-    same_state: float = 1e-5  # A settled motion with a state this near to one of a known orbit is on this orbit.
 
 
 SETTINGS = SearchSettings()
@@ -229,7 +227,7 @@ def _moving(system: System, late: Recurrence, rows: np.ndarray) -> tuple[np.ndar
     assert late.extrema is not None
     alive = rows[np.isfinite(late.states[rows]).all(axis=(1, 2))]
     high, low = late.extrema[alive, :, 0].max(axis=1, initial=-np.inf), late.extrema[alive, :, 1].min(axis=1, initial=np.inf)
-    moving = alive[~is_still(system, high, low, SETTINGS.still)]
+    moving = alive[~is_still(system, high, low, NEAR_RETURNS.still)]
     return moving, len(alive) - len(moving)
 
 
@@ -243,7 +241,7 @@ def _attracting(
     known = np.empty((0, system.dimension))
     unsettled = 0
     for states, period, highest, lowest in zip(late.states, late.period.tolist(), late.highest, late.lowest, strict=True):
-        if known.size and np.abs(known - states[-1]).max(axis=1).min() < SETTINGS.same_state:
+        if known.size and np.abs(known - states[-1]).max(axis=1).min() < NEAR_RETURNS.same_state:
             continue
         if not period:
             unsettled += 1

@@ -138,7 +138,7 @@ class CellSettings:
     rounds: int = 400  # The most rounds of starts from neighbours: more than the cells along a side of any chart.
 
 
-SETTINGS = CellSettings()
+CELLS = CellSettings()
 
 
 @dataclass
@@ -210,7 +210,7 @@ def stable_motions(request: ChartRequest) -> tuple[CellOutcomes, CellVerdicts, n
 
 def spread(request: ChartRequest, new: np.ndarray, known: np.ndarray) -> np.ndarray:
     """The known motions and those found by starting the new ones in neighbouring cells, again and again until none is added."""
-    for _ in range(SETTINGS.rounds):
+    for _ in range(CELLS.rounds):
         cell, states = seeds(request.system, new, known, request.shape)
         if not len(cell):
             break
@@ -224,7 +224,7 @@ def starts(system: System, count: int, window: Window, seed: int) -> np.ndarray:
     """(count, d): states spread over the window, every other one drawn in towards the contact, the last of them to 1 %."""
     states = initial_states(system, count, window, seed)
     contact, inner = rest_state(system), states[1::2]
-    inner[:] = contact + (inner - contact) * np.geomspace(1.0, SETTINGS.innermost, len(inner) + 1)[1:, None]
+    inner[:] = contact + (inner - contact) * np.geomspace(1.0, CELLS.innermost, len(inner) + 1)[1:, None]
     return states
 
 
@@ -235,9 +235,9 @@ def settle(request: ChartRequest, cell: np.ndarray, states: np.ndarray, known: n
     record = motion_type(request.system.dimension)
     moving, found, left = np.zeros(len(cell), record), [np.empty(0, record)], []
     moving["cell"], moving["state"], moving["starts"], moving["amplitude"] = cell, states, 1, np.inf
-    for share in (*(SETTINGS.stages if len(cell) > SETTINGS.few_motions else SETTINGS.few_stages), SETTINGS.patience):
-        if share == SETTINGS.patience:
-            many = np.bincount(moving["cell"], minlength=total)[moving["cell"]] > SETTINGS.patient_with
+    for share in (*(CELLS.stages if len(cell) > CELLS.few_motions else CELLS.few_stages), CELLS.patience):
+        if share == CELLS.patience:
+            many = np.bincount(moving["cell"], minlength=total)[moving["cell"]] > CELLS.patient_with
             left.append(moving[many])
             moving = moving[~many]
         moving, outcome, fading = _followed(request, moving, math.ceil(share * request.periods))
@@ -248,7 +248,7 @@ def settle(request: ChartRequest, cell: np.ndarray, states: np.ndarray, known: n
         settled = moving["period"] > 0
         # Until a motion of the cell has come to rest, fading motions are followed, to show that there is rest.
         size = np.where(settled | (captured[moving["cell"]] == 0), moving["amplitude"], fading)
-        small = ~rests & (size < least * np.where(settled, 1.0, SETTINGS.negligible))
+        small = ~rests & (size < least * np.where(settled, 1.0, CELLS.negligible))
         found.append(moving[settled & ~small])
         _count(tiny, moving[small])
         moving = joined(moving[~rests & ~settled & ~small])
@@ -275,7 +275,7 @@ def _followed(request: ChartRequest, motions: np.ndarray, periods: int) -> tuple
     if not len(motions):
         return motions, np.zeros(0, dtype=int), np.zeros(0)
     parameters = {path: values[motions["cell"]] for path, values in request.parameters.items()}
-    how: dict[str, Any] = {"max_period": request.max_period, "kept": SETTINGS.kept, "tol": request.tol}
+    how: dict[str, Any] = {"max_period": request.max_period, "kept": CELLS.kept, "tol": request.tol}
     motions, ends = motions_later(request.system, motions, periods, parameters, **how)
     motions["period"] = ends.period
     return motions, ends.outcome, _fading(ends, motions["amplitude"])
@@ -291,7 +291,7 @@ def _fading(ends: Recurrence, amplitude: np.ndarray) -> np.ndarray:
     if ends.extrema.shape[1] < 2:
         return amplitude
     before, last = np.abs(ends.extrema[:, -2:]).max(axis=2).T
-    return np.where(last < SETTINGS.fading * before, last, amplitude)
+    return np.where(last < CELLS.fading * before, last, amplitude)
 
 
 def joined(motions: np.ndarray) -> np.ndarray:

@@ -191,9 +191,6 @@ class TraceSettings:
     # motions do near their special points.
     slow: float = 1e-3
     patience: int = 8  # A motion that reaches the neighbour but has not settled there is followed for so many times the periods.
-    # A motion is the same after a step from cell to cell if its extrema have changed by less than this share of the amplitude,
-    # and after a shorter step by less than this times the root of its length, as extrema change beside a fold.
-    change: float = ALIKE.family
 
 
 SETTINGS = TraceSettings()
@@ -312,7 +309,7 @@ def is_near(last: np.ndarray, found: np.ndarray) -> np.ndarray:
     not compared, as an impact that appears at a grazing begins without speed.
     """
     size = np.maximum(last["amplitude"], found["amplitude"])
-    near = SETTINGS.change * np.sqrt(np.abs(found["share"] - last["share"]))
+    near = ALIKE.family * np.sqrt(np.abs(found["share"] - last["share"]))
     apart = np.maximum(*(np.abs(found[name] - last[name]) for name in ("amplitude", "other"))) <= near * size
     fastest = size + np.maximum(last["slowest"], found["slowest"])
     alike = np.abs(found["slowest"] - last["slowest"]) <= near * fastest

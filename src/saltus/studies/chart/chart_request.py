@@ -12,7 +12,7 @@ import numpy as np
 from saltus.checks import check_axis, check_count, check_dataset, check_memory, check_number, check_starts, check_work
 from saltus.enumerations import flags
 from saltus.errors import ParameterError, shown
-from saltus.flow import Ending, state_names
+from saltus.flow import RECURRENCE, Ending, state_names
 from saltus.provenance import check_provenance, identity, provenance
 from saltus.studies.chart.motions import KEPT, CellOutcome
 from saltus.systems import System, check_along, check_path, check_system, check_window
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from saltus.sweep import Plan, Variable
 
 CELLS = "saltus.studies.chart.cells:cells"
-MAX_PERIOD = 16  # the longest period that an ensemble recognises, in forcing periods
 NUMBERS = ("max_period", "starts", "least", "periods", "tol", "seed")
 
 
@@ -74,7 +73,7 @@ class ChartRequest:
         check_work("periods", float(self.starts) * len(self.vertical) * len(self.horizontal), self.periods)
         cells, numbers = len(self.vertical) * len(self.horizontal), 8 * (KEPT + 2)  # of 8 bytes each
         check_memory("horizontal", 8.0 * numbers * cells, f"{cells} cells")
-        check_count("max_period", self.max_period, 1, MAX_PERIOD)
+        check_count("max_period", self.max_period, 1, RECURRENCE.compiled_max_period)
         check_count("seed", self.seed, 0)
         check_number("least", self.least, above=0.0)
         check_number("tol", self.tol, at_least=1e-15, at_most=1e-6)

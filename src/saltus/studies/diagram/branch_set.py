@@ -149,10 +149,8 @@ class PlacedBranch:
 
     def solved(self, value: float, before: int) -> PeriodicOrbit | None:
         """The orbit at a value of the parameter after the point of this index, solved for; None if that fails."""
-        for place in (before, before + 1):
-            if self.columns[0, place] == value:
-                return self.branch.points[place].orbit
-        points = self.branch.solved_between(before, value)
+        there = [self.branch.points[place] for place in (before, before + 1) if self.columns[0, place] == value]
+        points = there or self.branch.solved_between(before, value)
         return points[0].orbit if points else None
 
 

@@ -268,9 +268,10 @@ class BandSearch(SearchedRange):
         return doubtful
 
     def _confirm_near(self, failed: list[SearchedValue]) -> None:
-        """Judge the nearest chaos beside values that turned out to have none; where this chaos fails too, go on outwards."""
+        """Judge the nearest chaos beside values that turned out to have none, with as much care; where this fails too, twice as
+        many values on each side, and so on."""
         for level in {entry.judgement_level for entry in failed}:
-            beside, reach = [entry.value for entry in failed if entry.judgement_level == level], self.settings.near
+            beside, reach = [entry.value for entry in failed if entry.judgement_level == level], 1
             while beside:
                 chaotic = [entry for entry in self.entries if entry.chaotic]
                 at = [bisect_left(chaotic, SearchedValue(value)) for value in beside]

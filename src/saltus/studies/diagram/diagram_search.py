@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from saltus.attractors import share_interval
-from saltus.flow import motions_from, stroboscopic
+from saltus.flow import RECURRENCE, motions_from, stroboscopic
 from saltus.orbits import PeriodicOrbit, keeps_symmetry, orbits_near_returns, solved_near
 from saltus.progress import Progress, part_of, silent
 from saltus.studies.diagram.bands import Bands, band_origins
@@ -19,7 +19,6 @@ from saltus.studies.diagram.chaos_search import BandSearch
 from saltus.studies.diagram.diagram_work import DiagramWork, side_by_side
 from saltus.studies.diagram.effort import EffortSettings
 from saltus.studies.diagram.simulated import LONG, AttractorsFound, BranchAssignment, SimulatedMotions, starts_at
-from saltus.studies.diagram.simulated import SETTINGS as SIMULATION
 from saltus.systems import System, Window, within_window
 
 
@@ -344,7 +343,7 @@ class DiagramSearch:
 
 def _without_repetition(motions: SimulatedMotions) -> SimulatedMotions:
     """Each attractor once, every value, and the motions that have not settled."""
-    found = AttractorsFound(motions, SIMULATION.max_period)
+    found = AttractorsFound(motions, RECURRENCE.compiled_max_period)
     kept = np.unique(motions.value, return_index=True)[1], found.rows, np.flatnonzero(motions.unsettled)
     return motions.only(np.unique(np.concatenate(kept)))
 

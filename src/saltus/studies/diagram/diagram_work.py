@@ -30,7 +30,7 @@ from saltus.orbits import (
     from_json,
     switch_branch,
 )
-from saltus.progress import Progress, silent
+from saltus.progress import LOOK_INTERVAL, Progress, silent
 from saltus.provenance import check_provenance, identity, provenance
 from saltus.studies.diagram.simulated import SimulatedMotions, followed, simulate_from
 from saltus.systems import System
@@ -39,8 +39,6 @@ if TYPE_CHECKING:
     from saltus.sweep import Memo, MemoKind, Plan
 
 R = TypeVar("R")
-
-LOOK_INTERVAL = 0.1  # Seconds between looks at Ctrl-C and at the progress of other threads.
 
 
 def side_by_side(beside: Callable[[Progress], object], here: Callable[[Progress], object], progress: Progress) -> None:

@@ -64,9 +64,6 @@ class ChaosSettings:
     # The values of a band within this share of the range are judged together, by the sum of the forcing periods in which none of
     # their motions has settled.
     every: float = 0.02
-    # Where chaos turns out to be a transient, this many values with chaos on each side are judged next with as much care; if
-    # these fail too, twice as many, and so on.
-    near: int = 1
     # Chaos next to transients must exclude mean lives this many times as long as theirs. Towards a crisis, lives grow like a
     # power between -1/2 and about -3/2 of the distance, so that the edge is wrong by no more than the width of its bracket.
     longer: float = 3.0

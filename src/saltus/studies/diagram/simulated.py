@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from saltus.enumerations import NumberedSentence
-from saltus.flow import Ending, Recurrence, find_recurrence, return_distances
+from saltus.flow import RECURRENCE, Ending, Recurrence, find_recurrence, return_distances
 from saltus.progress import Progress, silent
-from saltus.studies.chart.cells import seeds
+from saltus.studies.chart.cells import CELLS, seeds
 from saltus.studies.chart.motions import ALIKE, by_cell, is_alike, is_same, motion_type
 from saltus.systems import System, Window, even_steps, is_still, within_window
 
@@ -21,12 +21,7 @@ from saltus.systems import System, Window, even_steps, is_still, within_window
 class SimulationSettings:
     """How motions are started, followed and kept."""
 
-    # The longest period that the compiled lanes recognise (`RECURRENCE`), even if a diagram follows shorter ones only: motions of
-    # periods between must not be taken as unsettled.
-    max_period: int = 16
     kept: int = 64  # Stroboscopic states that are kept of each motion, as dots of a diagram and as starts of other motions.
-    # Every other start lies in a smaller copy of the window, down to this share of its size: some motions are small.
-    innermost: float = 1e-2
     # An unsettled motion is taken as slow, not chaotic, if it returns to an earlier state within this share of its amplitude.
     slow: float = 1e-2
     patience: int = 8  # Slow motions are followed for up to so many times the forcing periods of the others.
@@ -34,7 +29,6 @@ class SimulationSettings:
     # its return by this factor; otherwise it can hardly settle in the time that is left.
     nearer: float = 0.3
     still: float = 1e-6  # A motion that stays this near to the contact is at rest.
-    tol: float = 1e-11  # The error of a step: a tenth of the distance within which the lanes take states as the same.
 
 
 SETTINGS = SimulationSettings()
@@ -113,7 +107,7 @@ def starts_at(system: System, values: np.ndarray, count: int, window: Window, se
     offsets = np.array([np.random.default_rng([seed, *pair]).random(size) for pair in bits.tolist()]).reshape(-1, 1, size)
     number = np.arange(1, count + 1)
     points = 2.0 * ((offsets[..., :-1] + number[:, None] * steps) % 1.0) - 1.0
-    share = SETTINGS.innermost ** ((offsets[..., -1] + number * steps[0]) % 1.0)
+    share = CELLS.innermost ** ((offsets[..., -1] + number * steps[0]) % 1.0)
     inner = np.where(number % 2 == 0, share, 1.0)[..., None]
     return within_window(system, points, window, inner)
 
@@ -146,18 +140,20 @@ def simulate_from(
 def followed(
     system: System, path: str, values: np.ndarray, states: np.ndarray, periods: int, progress: Progress = silent
 ) -> SimulatedMotions:
-    """Follow motions from states (n, d) at values (n,) for at most so many forcing periods; none depends on the others."""
+    """Follow motions from states (n, d) at values (n,) for at most so many forcing periods; none depends on the others.
+
+    All periods that lanes recognise are looked for, even if a diagram follows shorter ones only: motions of periods between must
+    not be taken as unsettled.
+    """
     ends = find_recurrence(
         system,
         states,
         max(periods, SETTINGS.kept),
         parameters={path: values},
-        max_period=SETTINGS.max_period,
         kept=SETTINGS.kept,
         extrema=True,
         impact_count=True,
         speed=True,
-        tol=SETTINGS.tol,
         progress=progress,
     )
     return _motions(system, values, ends)
@@ -188,7 +184,7 @@ def _motions(system: System, values: np.ndarray, ends: Recurrence) -> SimulatedM
 
 def _return_distance(motions: SimulatedMotions) -> np.ndarray:
     """The least distance at which motions return to an earlier state, (n,); inf where that is not known."""
-    return np.asarray(np.nan_to_num(return_distances(motions.states, SETTINGS.max_period).min(axis=1), nan=np.inf))
+    return np.asarray(np.nan_to_num(return_distances(motions.states, RECURRENCE.compiled_max_period).min(axis=1), nan=np.inf))
 
 
 def _is_slow(motions: SimulatedMotions) -> np.ndarray:
