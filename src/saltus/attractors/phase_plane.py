@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.attractors.saddle_manifolds import PLANE, has_left
+from saltus.attractors.saddle_manifolds import MANIFOLDS, PLANE, has_left
 from saltus.attractors.stroboscopic_section import check_periodic
 from saltus.checks import check_number
 from saltus.errors import ParameterError
@@ -174,7 +174,6 @@ def _at_contact(system: System) -> list[Equilibrium]:
 class SeparatrixSettings:
     """How a separatrix is followed."""
 
-    offset: float = 1e-6  # Distance from the saddle at which it begins, on the tangent: the error is of the order of its square.
     # It ends within this distance of a saddle, once it has been ten times as far from all saddles.
     close: float = 1e-4
     span: float = 2.0  # The dimensionless time for which one call of `simulate` follows it.
@@ -295,7 +294,7 @@ def _branch(
     assert saddle.eigenvalues is not None
     backward = reversed_system(system)
     span, step = times
-    theta, velocity = saddle.place + away * SEPARATRICES.offset, -away * SEPARATRICES.offset * saddle.eigenvalues[1].real
+    theta, velocity = saddle.place + away * MANIFOLDS.offset, -away * MANIFOLDS.offset * saddle.eigenvalues[1].real
     now, end, left = 0.0, SeparatrixEnd.SPAN, False
     parts: list[np.ndarray] = []
     impacts: list[np.ndarray] = []

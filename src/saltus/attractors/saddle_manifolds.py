@@ -163,7 +163,7 @@ def _may_cross(scaled: np.ndarray) -> np.ndarray:
 class ManifoldSettings:
     """Where manifolds begin, and how exactly they are followed."""
 
-    offset: float = 1e-6  # d: the segment misses the manifold by about d^2, and its images miss it by less and less.
+    offset: float = 1e-6  # d, from the saddle: the tangent misses the manifold by about d^2, and its images by less and less.
     tolerance: float = 1e-13  # The error of a step of the motions along a manifold.
     hyperbolic: float = 1e-6  # The least difference of the multipliers' moduli from 1.
 

@@ -22,9 +22,8 @@ class CaptureSettings:
     """The intervals of a proof, and the speeds that are tried."""
 
     cells: int = 16  # The number of intervals into which the forcing period is divided.
-    batch: int = 8192  # Parameter sets that are treated at once if the time has no cells: their arrays then stay in the cache.
+    batch: int = 8192  # Parameter sets that are treated at once for each cell of the time: their arrays then stay in the cache.
     rest_cells: int = 64  # The number of intervals for a system at rest, where a bound is cheap and the load makes all its width.
-    cell_batch: int = 512  # Parameter sets that are treated at once if the time has cells, for the same reason.
     one: float = 1e-14  # A product of impact factors this close to 1 is 1: no law states its numbers more exactly.
     # The largest speeds over which the corrected invariant is bounded, as shares of the first guess; they are tried in turn.
     boxes: tuple[float, ...] = (0.7, 0.2)
@@ -226,8 +225,9 @@ class _Law:
             speed, steady = self._energy(cycle, impacts, always, limit / wide)
             chosen = np.flatnonzero((~steady | ~(speed > 0)) & (impacts.loss >= 0))
             if not self.recorded and (self.frequency is not None or not self.timed):
-                for start in range(0, chosen.size, CAPTURE.cell_batch):
-                    part = chosen[start : start + CAPTURE.cell_batch]
+                batch = CAPTURE.batch // CAPTURE.cells
+                for start in range(0, chosen.size, batch):
+                    part = chosen[start : start + batch]
                     found = self._by_invariant(cycle, impacts, always, limit / wide, part)
                     speed[:, part] = np.fmax(speed[:, part], found)
             least = np.minimum(least, np.where(impacts.loss >= 0, speed * narrow, 0.0))

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any
 
 import matplotlib as mpl
@@ -31,18 +30,7 @@ from saltus.plots.conventions import (
     unit_in_brackets,
 )
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ResponseSettings:
-    """How near dots and marks may come to one another, and how long a line of words may be."""
-
-    dotted_values: int = 25  # Simulated motions are drawn at about this many values: more dots would hide the lines.
-    letters: float = 880.0  # The number of letters of size one point that fit beside one another into a double column.
-    mark_distance: float = 1.7  # Of marks nearer to one another than this, in mm, only the first is drawn, by the order of MARKS.
-
-
-SETTINGS = ResponseSettings()
-
+DOTTED_VALUES = 25  # Simulated motions are drawn at about this many values: more dots would hide the lines.
 QSB_LINE: dict[str, Any] = {"color": "#7b2d9b", "linestyle": (0, (3, 2)), "linewidth": 1.0}
 FARTHEST_LINE: dict[str, Any] = {"color": LOOK.limit, "linestyle": (0, (1, 1.2)), "linewidth": 1.2}
 # Heavy where the model holds, thin where an assumption fails, thin and pale beyond a limit: distinct in grey as well.
@@ -119,7 +107,7 @@ def draw_special(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: flo
         places, first = special_places(spectrum, kind, quantity) / np.array([1.0, scale]), len(kept)
         inside = ((places >= low) & (places <= high)).all(axis=1)
         for place in places[inside]:
-            if all(np.linalg.norm((place - other) / (high - low) * unit) > SETTINGS.mark_distance for other in kept):
+            if all(np.linalg.norm((place - other) / (high - low) * unit) > 1.7 for other in kept):  # mm
                 kept.append(place)
         if len(kept) > first:
             ax.plot(*np.array(kept[first:]).T, linestyle="none", zorder=5, **_mark(style))
@@ -142,7 +130,7 @@ def draw_attractors(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: 
     """The attractors found by simulation, as dots over the branches: at some values only, but all that lie on no branch."""
     dots = spectrum["attractors"]
     values = np.unique(dots["parameter"].values)
-    shown = np.isin(dots["parameter"].values, values[:: max(1, round(len(values) / SETTINGS.dotted_values))])
+    shown = np.isin(dots["parameter"].values, values[:: max(1, round(len(values) / DOTTED_VALUES))])
     ax.plot(dots["parameter"].values[shown], dots[quantity].values[shown] / scale, zorder=4, **DOTS)
     if "unplaced" in spectrum.children:
         other = spectrum["unplaced"]
@@ -209,7 +197,7 @@ def response_legend(where: Any, spectra: list[Any], *, limits: bool = True, crit
         where.legend(**entries, handler_map=handlers, loc="best", handlelength=3.6)
         return
     width = where.get_figwidth() * 25.4 / LOOK.double_column
-    letters = round(SETTINGS.letters * width / mpl.rcParams["font.size"])
+    letters = round(880.0 * width / mpl.rcParams["font.size"])  # so many of size one point fit into a double column
     outside_legend(
         where,
         **entries,

@@ -249,7 +249,7 @@ def _borders(shaken: Shaken, sizes: np.ndarray, rates: np.ndarray, cells: Outcom
     row, column = np.nonzero(kinds[:, 1:] != kinds[:, :-1])
     low, high, frequency, before = sizes[column], sizes[column + 1], rates[row], kinds[row, column]
     record = isinstance(shaken.signal, Record)
-    for _ in range((OVERTURNING.rounding if record else OVERTURNING.halvings) if row.size else 0):
+    for _ in range((np.finfo(float).nmant + 2 if record else OVERTURNING.halvings) if row.size else 0):
         middle = 0.5 * (low + high)
         same = shaken.outcomes(frequency, middle).kinds == before
         low, high = np.where(same, middle, low), np.where(same, high, middle)

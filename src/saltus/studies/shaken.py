@@ -24,7 +24,6 @@ class OverturningSettings:
 
     free: float = 40.0  # motions go on for so many times 1 / lambda after the load, with the rate lambda of the saddle
     halvings: int = 24  # of the interval between two cells of the map that differ: then Newton's method converges
-    rounding: int = 54  # halvings after which nothing is left of the interval but rounding
     samples: int = 500  # at which a motion is compared with the saddle after the load
     near: float = 0.3  # a motion comes near to the saddle within this share of its distance from the contact
     iterations: int = 12  # of Newton's method from the halved interval

@@ -20,8 +20,6 @@ from saltus.systems.two_layer import TwoLayer
 from saltus.systems.unit_cell import CellLayout, UnitCell
 
 BASE = 1.4  # of a cell whose model says nothing of it: the horizontal edges in units of l
-BETWEEN = 0.9  # the space between two cells of a chain, in units of l
-COILS = 6  # of a spring
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,8 +101,8 @@ def _box(role: str, x: float, y: float, width: float, height: float) -> Shape:
 def _spring(x: float, y: float, to: float, to_y: float | None = None) -> Shape:
     """A spring from (x, y) to another place, by default at the same height."""
     start, end = np.array([x, y]), np.array([to, y if to_y is None else to_y])
-    along, share = end - start, np.concatenate([[0.0], np.linspace(0.15, 0.85, 2 * COILS + 1), [1.0]])
-    sideways = np.concatenate([[0.0, 0.0], np.tile([1.0, -1.0], COILS)[: 2 * COILS - 1], [0.0, 0.0]])
+    along, share = end - start, np.concatenate([[0.0], np.linspace(0.15, 0.85, 13), [1.0]])  # six coils
+    sideways = np.concatenate([[0.0, 0.0], np.tile([1.0, -1.0], 6)[:11], [0.0, 0.0]])
     length = math.hypot(*along) or 1.0
     across = np.array([-along[1], along[0]]) / length
     return Shape("line", start + share[:, None] * along + 0.09 * sideways[:, None] * across, "spring")
@@ -205,7 +203,7 @@ def _two_layers(model: TwoLayer, place: np.ndarray) -> list[Shape]:
 
 def _chain(model: CellChain, place: np.ndarray) -> list[Shape]:
     """The cells side by side, with the springs between their masses."""
-    step = BASE + BETWEEN
+    step = BASE + 0.9  # with a space between two cells
     cells = [_layered(model.beta0, float(place[2 * i]), float(place[2 * i + 1]), i * step) for i in range(model.cells)]
     masses = [[shape.points[0] for shape in cell if shape.role == "mass"] for cell in cells]
     springs = [_spring(*a, *b) for before, after in pairwise(masses) for a, b in zip(before, after, strict=True)]

@@ -11,7 +11,7 @@ from itertools import pairwise
 from saltus.systems import System
 from saltus.theory.layer import Layer, layers
 
-MOMENT_ROUNDING = 4e-15  # moments below this share of a layer's scale count as zero
+MOMENT_ROUNDING = 4e-15  # moments below this share of a layer's scale count as zero, such as V cos(beta0) at pi/2
 
 
 class Stability(Enum):

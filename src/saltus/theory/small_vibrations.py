@@ -15,8 +15,7 @@ from saltus.public_functions import Numbers
 from saltus.systems import System
 from saltus.theory.arguments import numbers
 from saltus.theory.layer import Layer, layers, metainterface
-
-UPRIGHT = 1e-15  # moments V cos(beta0) below this count as 0: they are the rounding of cos(pi/2)
+from saltus.theory.loaded_equilibria import MOMENT_ROUNDING
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,8 +113,8 @@ def linear_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
     """
     kappa, closing = _linear(beta0, vertical)
     size = np.abs(numbers("theta0", theta0))
-    if closing <= UPRIGHT:
-        if closing < -UPRIGHT or kappa <= 0:
+    if closing <= MOMENT_ROUNDING:
+        if closing < -MOMENT_ROUNDING or kappa <= 0:
             raise ParameterError(
                 f"no vibration about theta = 0, stable only for V cos(beta0) below 0, got {-closing:.6g}", "vertical"
             )
@@ -162,7 +161,7 @@ def short_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
     1.0
     """
     closing = _linear(beta0, vertical)[1]
-    if closing <= UPRIGHT:
+    if closing <= MOMENT_ROUNDING:
         raise ParameterError(f"this expansion needs V cos(beta0) below 0, got {-closing:.6g}", "vertical")
     return 4 * np.sqrt(2 * np.abs(theta0)) / math.sqrt(closing)
 

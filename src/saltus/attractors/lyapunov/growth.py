@@ -29,7 +29,6 @@ class LyapunovSettings:
 
     batches: int = 16  # The least number of batches from which a standard error is taken.
     student: float = 2.131449545559323  # The two-sided 95 % point of Student's t with batches - 1 degrees of freedom.
-    stretches: int = 32  # The number of stretches of a search, whose means give error bars to both halves of the run.
     longest_span: float = 6.5  # Derivatives grow and shrink by less than 1e6 in this time, a forcing period at Omega = 1.
     look_back: int = 160  # The forcing periods after the run within which it is tested whether a motion repeats itself.
     lossless: float = 1.0 - 1e-14  # A product of impact factors below this counts as below 1.

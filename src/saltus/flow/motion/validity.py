@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from saltus.flow.kernel.layout import LOSSLESS
 from saltus.notebook import rows_table
 from saltus.systems import System, energy_gain
 
 STEP_SAMPLES = 12  # samples in each step to find changes of sign; a step is shorter than the time scale of a margin
-GAIN_ROUNDING = 1e-12  # A smaller share by which an impact raises the energy is rounding.
 RIDDERS_ITERATIONS = 8  # of Ridders' method, each of which doubles the correct digits or at least halves the bracket
 
 
@@ -147,7 +147,7 @@ class ValidityCheck:
             {name: beyond / duration if duration else 0.0 for name, beyond in self._beyond.items()},
         )
         gains = energy_gain(self._system.contact_model, self._system.impact) if model.contacts else {}
-        return Validity(dict(self._first), shares, {name: gain for name, gain in gains.items() if gain > GAIN_ROUNDING})
+        return Validity(dict(self._first), shares, {name: gain for name, gain in gains.items() if gain > LOSSLESS})
 
 
 def _beyond(

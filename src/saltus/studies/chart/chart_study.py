@@ -26,13 +26,10 @@ from saltus.theory import quasi_static_border
 if TYPE_CHECKING:
     import xarray
 
-SAMPLE = 60  # ends that are solved for
 MARGIN = 0.02  # cells by which an end may lie outside its enclosure, as motions near their end settle slowly
 
 
-def sampled_ends(
-    system: System, paths: tuple[str, str], chart: ChartMotions, borders: Borders, count: int = SAMPLE
-) -> np.ndarray:
+def sampled_ends(system: System, paths: tuple[str, str], chart: ChartMotions, borders: Borders, count: int = 60) -> np.ndarray:
     """For a sample of the motions that end between two cells, (n,): 1 if continuation of the orbit from the middle of its cell
     finds the special point where simulation has enclosed the end, 0 if elsewhere, nan if it finds none."""
     changes = changes_of(chart)
@@ -129,7 +126,6 @@ def _neighbours(some: np.ndarray, others: np.ndarray) -> int:
     return int(sum((a & b).sum() for a, b in pairs))
 
 
-MORE = 4  # times as many starts
 CHAOTIC = (CellOutcome.CHAOS, CellOutcome.MOTIONS_AND_CHAOS)
 
 
@@ -190,8 +186,8 @@ def wrong_cells(system: System, chart: xarray.Dataset, *, cells: int = 100, seed
 
 
 def _numbers(request: ChartRequest, seed: int) -> dict[str, Any]:
-    """The arguments of a chart with more and with other starts."""
-    more = replace(request, starts=MORE * request.starts, seed=request.seed + seed)
+    """The arguments of a chart with four times as many and with other starts."""
+    more = replace(request, starts=4 * request.starts, seed=request.seed + seed)
     return {name: getattr(more, name) for name in more.__dataclass_fields__}
 
 

@@ -83,8 +83,7 @@ class PlacedBranch:
     @cached_property
     def _reach(self) -> tuple[float, float, set[float]]:
         """The least and the largest parameter, and the periods of the orbits."""
-        parameter, period = self.columns[0], self.columns[4]
-        return float(parameter.min()), float(parameter.max()), set(period.tolist())
+        return float(self.columns[0].min()), float(self.columns[0].max()), set(self.columns[4].tolist())
 
     def may_hold(self, low: float, high: float, periods: set[int]) -> bool:
         """Whether an orbit of one of these periods, at a value from `low` to `high`, may lie on the branch: a fast test, as most
@@ -113,8 +112,7 @@ class PlacedBranch:
         The uncertainty is inf where the parameter turns, or where too few points are joined.
         """
         here, there = self.columns[SEEN][:, before], self.columns[SEEN][:, before + 1]
-        parameter = self.columns[0]
-        width = parameter[before + 1] - parameter[before]
+        parameter, width = self.columns[0], np.diff(self.columns[0])[before]
         share = np.divide(values - parameter[before], width, out=np.zeros(len(values)), where=width != 0.0)
         read, uncertain = here + share * (there - here), np.full(len(values), np.inf)
         smooth = np.flatnonzero(self._smooth[before])

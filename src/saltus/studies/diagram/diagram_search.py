@@ -17,8 +17,8 @@ from saltus.studies.diagram.bands import Bands, band_origins
 from saltus.studies.diagram.branch_set import BranchSet, PlacedBranch, placed, stable_motions
 from saltus.studies.diagram.chaos_search import BandSearch
 from saltus.studies.diagram.diagram_work import DiagramWork, side_by_side
-from saltus.studies.diagram.effort import EffortSettings
-from saltus.studies.diagram.simulated import LONG, AttractorsFound, BranchAssignment, SimulatedMotions, starts_at
+from saltus.studies.diagram.effort import CHAOS, EffortSettings
+from saltus.studies.diagram.simulated import AttractorsFound, BranchAssignment, SimulatedMotions, starts_at
 from saltus.systems import System, Window, within_window
 
 
@@ -146,7 +146,7 @@ class DiagramSearch:
     def _is_partial(self, run: np.ndarray) -> bool:
         """Whether the orbits of a run are followed only while they are stable: those of long periods, and those that are stable
         in a small part of the range only, as far as the simulated values show."""
-        if self.found.motions.period[run[0]] > LONG:
+        if self.found.motions.period[run[0]] > CHAOS.long_period:
             return True
         values, least = self.found.motions.value[run], SETTINGS.narrow * (self.bounds[1] - self.bounds[0])
         gap = np.diff([self.bounds[0], *self.grid, self.bounds[1]]).max()

@@ -21,8 +21,8 @@ from saltus.studies.diagram.bands import band_dataset, explained
 from saltus.studies.diagram.branch_set import BranchSet
 from saltus.studies.diagram.diagram_search import DiagramSearch
 from saltus.studies.diagram.diagram_work import DiagramWork, diagram_plan, diagram_work
-from saltus.studies.diagram.effort import EFFORTS, check_diagram, read_effort
-from saltus.studies.diagram.simulated import LONG, BranchAssignment
+from saltus.studies.diagram.effort import CHAOS, EFFORTS, check_diagram, read_effort
+from saltus.studies.diagram.simulated import BranchAssignment
 from saltus.systems import Box, System, check_window
 from saltus.theory import amplitude_limits
 
@@ -297,7 +297,7 @@ def bifurcation_diagram(
     progress(0.0, "searching")
     plan, middle = diagram_plan(system, path, (low, high), area, seed), system.with_({path: 0.5 * (low + high)})
     with diagram_work(middle, path, plan, None if store is None else Path(store), workers, scheduler) as work:
-        branches = BranchSet(work, (low, high), min(max_period, LONG), step, switch, tried.branches)
+        branches = BranchSet(work, (low, high), min(max_period, CHAOS.long_period), step, switch, tried.branches)
         search = DiagramSearch(work, (low, high), grid, area, seed, tried, branches, max_period)
         _search(search, repelling, bands, values is None, progress)
         tree = diagram_tree(search, kind="bifurcation_diagram", effort=str(read_effort(effort)), max_period=max_period)

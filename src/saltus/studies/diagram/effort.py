@@ -38,6 +38,7 @@ class ChaosSettings:
     step: float = 1e-3
     # ... or to this one where motions have longer periods than `long_period`: cascades and narrow bands are near.
     fine_step: float = 3e-4
+    # Orbits of longer periods are many, and most have small basins: only those on which random motions end are followed.
     long_period: int = 6
     undecided: float = 1.0  # Factor by which both are larger between two values that are undecided, as where motions are on tori.
     edge: float = 1e-4  # The bracket of an edge is halved down to this share of the range.

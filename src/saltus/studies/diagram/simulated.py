@@ -14,6 +14,7 @@ from saltus.flow import RECURRENCE, Ending, Recurrence, find_recurrence, return_
 from saltus.progress import Progress, silent
 from saltus.studies.chart.cells import CELLS, seeds
 from saltus.studies.chart.motions import ALIKE, by_cell, is_alike, is_same, motion_type
+from saltus.studies.diagram.effort import CHAOS
 from saltus.systems import System, Window, even_steps, is_still, within_window
 
 
@@ -205,9 +206,6 @@ class BranchAssignment(NumberedSentence):
     LEFT = 7, "it is stable in a small part of the range alone, and the effort follows no more of such"
 
 
-LONG = 6  # Orbits of longer periods are many, and most have small basins: only those on which random motions end are followed.
-
-
 @dataclass
 class AttractorsFound:
     """All motions that were simulated, and the different attractors among them: each once at each value."""
@@ -250,7 +248,7 @@ class AttractorsFound:
         self.attractor[rows] = np.repeat(self.rows, self.starts)
         period = self.motions.period[self.rows]
         self.assignment[self.rows[period > self.max_period]] = BranchAssignment.LONGER
-        self.assignment[np.intersect1d(self.open, self.rows[period > LONG])] = BranchAssignment.RARE
+        self.assignment[np.intersect1d(self.open, self.rows[period > CHAOS.long_period])] = BranchAssignment.RARE
 
     @property
     def open(self) -> np.ndarray:
