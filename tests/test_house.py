@@ -266,7 +266,7 @@ CEILINGS = {
     "asking a model of which class it is": 23,
     "arguments of a compiled function": 6,
     "public names behind doors": 440,
-    "tuned numbers": 523,
+    "tuned numbers": 480,
     "files of the library": 266,
 }
 
@@ -334,7 +334,7 @@ def measured() -> dict[str, int]:
         "asking a model of which class it is": len(list(asked_of_models())),
         "arguments of a compiled function": max(compiled_arguments()),
         "public names behind doors": sum(len(behind_the_door(f"saltus.{room}")) for room in ROOMS),
-        "tuned numbers": len(list(tuned())),
+        "tuned numbers": 480len(list(tuned())),
         "files of the library": len(FILES),
     }
 
