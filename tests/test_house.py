@@ -334,7 +334,7 @@ def measured() -> dict[str, int]:
         "asking a model of which class it is": len(list(asked_of_models())),
         "arguments of a compiled function": max(compiled_arguments()),
         "public names behind doors": sum(len(behind_the_door(f"saltus.{room}")) for room in ROOMS),
-        "tuned numbers": 480len(list(tuned())),
+        "tuned numbers": len(list(tuned())),
         "files of the library": len(FILES),
     }
 
