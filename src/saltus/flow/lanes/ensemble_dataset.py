@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.checks import check_dataset
-from saltus.flow.kernel.layout import Status
+from saltus.flow.kernel.layout import LOSSLESS, Status
 from saltus.flow.lanes.options import Sample, Until
 from saltus.flow.motion.events import Stop
 from saltus.flow.motion.motion import rate_name, state_names
-from saltus.flow.motion.validity import GAIN_ROUNDING
 from saltus.provenance import provenance
 from saltus.public_functions import answered
 from saltus.systems import energy_gains
@@ -132,7 +131,7 @@ def _add_gains(writer: _Writer, system: System, inputs: Inputs) -> None:
     which = np.zeros(inputs.size, dtype=np.int16)
     gains = energy_gains(twin.model, twin.impact, which.shape)
     for i, gain in enumerate(gains.values()):
-        which |= np.where(gain > GAIN_ROUNDING, 1 << i, 0).astype(np.int16)
+        which |= np.where(gain > LOSSLESS, 1 << i, 0).astype(np.int16)
     writer.add("gaining_contacts", which, "1", "contacts at which impacts may gain energy", **_masks(list(gains)))
 
 
