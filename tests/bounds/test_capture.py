@@ -294,7 +294,7 @@ def test_many_parameter_sets_at_once_are_each_as_alone(monkeypatch):
     together = capture_speed(BASE, cases)
     alone = [float(capture_speed(one(cases, i))) for i in range(12)]
     assert together == pytest.approx(alone, rel=1e-12)
-    monkeypatch.setattr(module, "CAPTURE", replace(module.CAPTURE, batch=5, cell_batch=3))
+    monkeypatch.setattr(module, "CAPTURE", replace(module.CAPTURE, batch=5))
     assert capture_speed(BASE, cases) == pytest.approx(together, rel=1e-12)
 
 

@@ -225,7 +225,7 @@ class _Law:
             speed, steady = self._energy(cycle, impacts, always, limit / wide)
             chosen = np.flatnonzero((~steady | ~(speed > 0)) & (impacts.loss >= 0))
             if not self.recorded and (self.frequency is not None or not self.timed):
-                batch = CAPTURE.batch // CAPTURE.cells
+                batch = max(1, CAPTURE.batch // CAPTURE.cells)
                 for start in range(0, chosen.size, batch):
                     part = chosen[start : start + batch]
                     found = self._by_invariant(cycle, impacts, always, limit / wide, part)
