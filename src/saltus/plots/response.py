@@ -253,7 +253,7 @@ def line_labels(branches: list[Any]) -> list[tuple[str, list[dict[str, Any]]]]:
 POINTS: dict[str, Any] = {"color": LOOK.ink, "linestyle": "none", "marker": ".", "markeredgewidth": 0.0, "rasterized": True}
 
 
-AT_REST = 1e-9  # A motion that stays within this of the contact for a period is at rest, and its states are left out.
+HARDLY_MOVES = 1e-9  # A motion that stays within this of the contact for a period is at rest, and its states are left out.
 
 QUANTITIES = ("amplitude", "highest", "lowest", "slowest")  # those of branches, special points and simulated motions
 
@@ -330,7 +330,7 @@ def draw_stroboscopic_states(ax: Any, tree: Any) -> None:
     """The states at phase 0 of the load of the simulated motions from every start, period after period."""
     section = tree["stroboscopic"]
     draw_bands(ax, tree)
-    moving = section["peak"].values > AT_REST
+    moving = section["peak"].values > HARDLY_MOVES
     values, places = section["value"].values[moving], section["position"].values[moving]
     low, high = ax.get_xlim()
     width = ax.get_window_extent().width / ax.figure.dpi * 72.0  # points
