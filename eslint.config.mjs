@@ -1,6 +1,6 @@
 // What the linter refuses; the compiler of TypeScript checks the types.
 const browser = ["document", "window", "globalThis", "location", "history", "navigator", "matchMedia", "addEventListener", "removeEventListener",
-  "requestAnimationFrame", "getComputedStyle", "setTimeout", "clearTimeout", "performance", "URL", "Blob", "Response", "Worker",
+  "requestAnimationFrame", "ResizeObserver", "IntersectionObserver", "getComputedStyle", "setTimeout", "clearTimeout", "performance", "URL", "Blob", "Response", "Worker",
   "DecompressionStream", "Option", "HTMLElement", "HTMLSelectElement", "HTMLInputElement", "atob", "structuredClone", "WebAssembly", "self",
   "postMessage", "onmessage", "Buffer", "console", "process", "Event"];
 

@@ -17,6 +17,7 @@ from typing import Any
 from against import beside_commit
 from auto import beside_auto
 from machine import about
+from pages import beside_pages
 from peers import MODULES, PROTOTYPE, Peer, firsts, load_peers
 from plot import draw
 from report import report
@@ -97,9 +98,10 @@ def main() -> None:
     write_text(folder / "benchmarks.json", json.dumps(results, indent=1) + "\n")
     write_bytes(folder / "benchmarks.png", draw(results))
     print(write_text(folder / "benchmarks.md", report(results)).read_text())
-    if set(chosen.only) == set(MODULES):  # AUTO and Siconos are peers too, in files of their own
+    if set(chosen.only) == set(MODULES):  # AUTO and Siconos are peers too, and the page is beside none, in files of their own
         beside_auto(head, chosen.quick, folder)
         beside_siconos(head, chosen.quick, folder)
+        beside_pages(head, chosen.quick, folder)
 
 
 if __name__ == "__main__":  # worker processes import this file

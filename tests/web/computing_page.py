@@ -52,7 +52,7 @@ def field(path: str, part: str = ".value") -> str:
 
 def place(page: BrowserPage, view: str, x: float, y: float) -> tuple[float, float]:
     """Where a point of a view's plane stands in the window."""
-    script = """(() => { const plot = saltusPage.plotOf(%s); plot.top.scrollIntoView({block: "center"});
+    script = """(() => { const plot = saltusPage.plotOf(%s); plot.top.scrollIntoView({block: "center"}); plot.drawNow();
     const painter = plot.painter(plot.top.getContext("2d"), {}); const box = plot.top.getBoundingClientRect();
     return [box.x + painter.x(%r), box.y + painter.y(%r)]; })()"""
     return tuple(page.evaluate(script % (json.dumps(view), x, y)))

@@ -23,6 +23,7 @@ NODE = shutil.which("node")
 pytestmark = pytest.mark.skipif(NODE is None, reason="node is not installed here")
 Harmonic, Load, System = saltus.Harmonic, saltus.Load, saltus.System
 NEAR = 1e-12
+AT = [1.0, 5.0]  # times at which energies are compared
 
 
 def shaken(rng, channel, **more):
@@ -130,12 +131,12 @@ def events_of(motion):
     return [(event.time, str(event.kind)) for event in motion.events]
 
 
-def compared(system, start, motion, other):
+def compared(motion, beside, other):
     """How many events of a motion agree with those of the page, all of them as far as rounding lets them be known."""
-    beside = [found for shift in (1e-14, -1e-14, 3e-14) if not isinstance(found := started(system, start, shift), str)]
     own, page, count = events_of(motion), other["events"], 0
+    known = [events_of(each) for each in beside]
     for i, (time, kind) in enumerate(own):
-        near = [events_of(each)[i] for each in beside if len(each.events) > i]
+        near = [events[i] for events in known if len(events) > i]
         if not near or any(other_kind != kind for _, other_kind in near):
             return count, False
         spread = max(abs(other_time - time) for other_time, _ in near)
@@ -148,6 +149,29 @@ def compared(system, start, motion, other):
     return count, True
 
 
+def check_whole(system, motion, beside, other):
+    """A motion that rounding does not change: its end, its margins and its energy are the page's."""
+    assert other["stop"] == motion.stop
+    ends = [np.append(np.ravel(m.position), np.ravel(m.velocity)) for m in (motion, *beside)]
+    spread = max(np.max(np.abs(end - ends[0])) for end in ends[1:])
+    assert np.max(np.abs(other["end"] - ends[0])) <= NEAR + 100.0 * spread, (system, other["end"], ends)
+    allowed = 1e-9 + 1e4 * spread  # a margin that is passed slantwise is passed later or earlier
+    for name, share in other["validity"]["share"].items():
+        assert abs(share - motion.validity.share[name]) <= allowed, (system, name, other["validity"], motion.validity)
+        if name != motion.limit:  # at which it ends, so that rounding decides on which side
+            assert (other["validity"]["first"][name] is None) == (motion.validity.first[name] is None), (system, name)
+    for time, energy in zip(AT, other["energies"], strict=True):
+        assert time > motion.time or abs(energy - kinetic_energy(system, motion, time)) <= allowed, (system, time)
+
+
+def kinetic_energy(system, motion, time):
+    """Of the model itself, at Python's state."""
+    position, velocity = (np.reshape(each, (-1, 1))[:, 0] for each in motion.at([time])[:2])
+    side = motion.side if not system.model.sides else float(motion.dense.states(np.array([time]))[2][0]) or 1.0
+    state = (position[0], velocity[0]) if len(position) == 1 else (tuple(position), tuple(velocity))
+    return system.model.kinetic_energy(time, *state, side, system.load)
+
+
 def check(seed, each, kinds, folder):
     rng = np.random.default_rng(seed)
     tasks, known = [], []
@@ -155,7 +179,7 @@ def check(seed, each, kinds, folder):
         made = [kind(rng) for _ in range(each)]
         wasm, description = page_parts(made[0][0])
         motions = [
-            {"values": system.parameters, "start": as_start(system, start), **length_of(system), "at": [1.0, 5.0]}
+            {"values": system.parameters, "start": as_start(system, start), **length_of(system), "at": AT}
             for system, start in made
         ]
         tasks.append({"wasm": base64.b64encode(wasm).decode(), "description": description, "motions": motions})
@@ -163,19 +187,16 @@ def check(seed, each, kinds, folder):
     counts, whole = 0, 0
     for made, found in zip(known, in_node(tasks, folder), strict=True):
         for (system, start), other in zip(made, found, strict=True):
-            motion = started(system, start)
+            motion, *beside = (started(system, start, shift) for shift in (0.0, 1e-14, -1e-14, 3e-14))
             if isinstance(motion, str):
                 assert other["reason"] == motion
                 continue
-            count, complete = compared(system, start, motion, other)
+            followed = [each for each in beside if not isinstance(each, str)]
+            count, complete = compared(motion, followed, other)
             counts += count
-            if complete and all(not isinstance(started(system, start, shift), str) for shift in (1e-14, -1e-14)):
+            if complete and len(followed) == len(beside):
                 whole += 1
-                assert other["stop"] == motion.stop
-                beside = [started(system, start, shift) for shift in (1e-14, -1e-14)]
-                ends = [np.append(np.ravel(m.position), np.ravel(m.velocity)) for m in (motion, *beside)]
-                spread = max(np.max(np.abs(end - ends[0])) for end in ends[1:])
-                assert np.max(np.abs(other["end"] - ends[0])) <= NEAR + 100.0 * spread, (system, other["end"], ends)
+                check_whole(system, motion, beside, other)
     return counts, whole
 
 

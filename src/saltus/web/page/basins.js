@@ -184,16 +184,24 @@ export class Basins {
     const canvas = document.createElement("canvas");
     canvas.width = canvas.height = BASIN_GRID;
     const ctx = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+    const picture = ctx.createImageData(BASIN_GRID, BASIN_GRID);
+    const [open, ...inks] = [undecided, ...colors].map(channels);
     for (let row = 0; row < BASIN_GRID; row++) {
       for (let column = 0; column < BASIN_GRID; column++) {
         const label = this.known(column, row);
         if (label === null) continue;
-        ctx.fillStyle = label < 0 ? undecided : (colors[label % colors.length] ?? undecided);
-        ctx.fillRect(column, BASIN_GRID - 1 - row, 1, 1);
+        const ink = (label < 0 ? open : inks[label % inks.length]) ?? [0, 0, 0];
+        picture.data.set([...ink, 255], 4 * ((BASIN_GRID - 1 - row) * BASIN_GRID + column));
       }
     }
+    ctx.putImageData(picture, 0, 0);
     return canvas;
   }
+}
+
+/** Red, green and blue of a colour that is written as #rrggbb. @param {string} color */
+function channels(color) {
+  return [1, 3, 5].map((at) => Number.parseInt(color.slice(at, at + 2), 16) || 0);
 }
 
 /** All cells, those of the coarse grids first, and within a grid spread over the plane. */

@@ -25,6 +25,7 @@ export class NumberField {
     this.entry = entry;
     this.host = host;
     this.id = `number-${++fields}`;
+    this.shown = ""; // what is to be seen of the number, as text
     this.typing = false; // a text that is being typed stays as it is
     this.name = entry.path.split(".").slice(1).join(".") || entry.path;
     this.element = document.createElement("div");
@@ -180,6 +181,8 @@ export class NumberField {
     if (this.typing) return;
     const value = this.host.value(this.entry.path);
     const [low, high] = this.range();
+    const shown = [value, low, high, this.inDegrees(), this.text?.value].join();
+    if (shown === this.shown && !this.element.classList.contains("refused")) return;
     if (this.text) this.text.value = this.written(value);
     this.text?.classList.toggle("long", this.written(value).length > 11);
     if (this.slider) {
@@ -194,6 +197,7 @@ export class NumberField {
     if (this.refusal) this.refusal.textContent = "";
     this.text?.removeAttribute("aria-invalid");
     this.element.classList.remove("refused");
+    this.shown = [value, low, high, degrees, this.text?.value].join();
   }
 
   /** The end of a slider, in few digits where they are exact enough to read. @param {number} value */

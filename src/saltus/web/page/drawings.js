@@ -178,7 +178,7 @@ function betweenStops(scene) {
     ...floor(anchor, right + 0.35 * room, -size),
     ...upright(anchor, -size, 1.6 * size, -1),
     stop(left - size, size, -1), stop(right + size, size, 1),
-    ...tied(scene, anchor, x - size, size),
+    ...tied(scene, anchor, x - size, size, 0.62),
     mass(x, size),
     ...along(x, 2 * size, scene.load("force"), room),
   ];
@@ -191,7 +191,7 @@ function pair(scene) {
   const [z, x] = [at(scene.state, 0), at(scene.state, 1)];
   const reach = Math.max(reachOf(scene, 0, 0), gap);
   const size = 0.14 * gap;
-  const [inner, tall] = [gap + size, 3 * size];
+  const [inner, tall] = [gap + size, Math.max(3 * size, 0.12 * reach)];
   const anchor = -(reach + inner + 1.4 * gap);
   const thick = 0.5 * size;
   const walls = [z - inner - thick, z + inner + thick];
@@ -205,7 +205,7 @@ function pair(scene) {
     { kind: "circle", points: [[z + x, -tall + size]], radius: size, role: "mass" },
     ...along(z, tall + size, scene.load("force"), reach),
   ];
-  return { shapes, box: [anchor - 0.2 * gap, reach + inner + gap, -1.6 * gap, 1.6 * gap] };
+  return { shapes, box: [anchor - 0.2 * Math.max(gap, 0.4 * reach), reach + inner + gap, -1.6 * gap, 1.6 * gap] };
 }
 
 /** @param {Scene} scene @returns {Picture} */
@@ -231,7 +231,7 @@ function onBelt(scene) {
     ...upright(anchor, -size, 1.6 * size, -1),
     ...tied(scene, anchor, x - size, size),
     mass(x, size),
-    ...along(x, 2 * size, scene.load("force"), reach),
+    ...along(x + Math.sign(scene.load("force")) * size, 0, scene.load("force"), reach),
     arrow([x, 3.4 * size], [x, 1.5 * size]),
   ];
   return { shapes, box: [anchor - 0.3 * reach, right + 0.5 * reach, -1.4 * reach, 1.2 * reach] };
@@ -251,7 +251,7 @@ function mass(x, size) {
 
 /** @param {number} face @param {number} size @param {number} side @returns {Shape} */
 function stop(face, size, side) {
-  return { kind: "polygon", points: rectangle(face, face + side * 0.6 * size, -size, 1.2 * size), role: "wall" };
+  return { kind: "polygon", points: rectangle(face, face + side * 0.6 * size, -size, -0.1 * size), role: "wall" };
 }
 
 /** A wheel of the belt with a spoke that turns. @param {number} x @param {number} y @param {number} radius @param {number} turn @returns {Shape[]} */
@@ -263,16 +263,16 @@ function roller(x, y, radius, turn) {
   ];
 }
 
-/** A spring, and beside it a dashpot where there is damping, from `left` to `right`. @param {Scene} scene @param {number} left @param {number} right @param {number} size @returns {Shape[]} */
-function tied(scene, left, right, size) {
+/** A spring, and beside it a dashpot where there is damping, from `left` to `right`; `above`, in sizes, is how high they are held. @param {Scene} scene @param {number} left @param {number} right @param {number} size @param {number} [above] @returns {Shape[]} */
+function tied(scene, left, right, size, above = 0) {
   const damped = number(scene, "damping", 0) > 0;
-  const high = damped ? 0.5 * size : 0;
+  const high = (damped && !above ? 0.5 : above) * size;
   /** @type {Shape[]} */
   const parts = [];
-  if (number(scene, "stiffness", 1) > 0) parts.push(coil([left, high], [right, high], 14, 0.32 * size, "spring"));
+  if (number(scene, "stiffness", 1) > 0) parts.push(coil([left, high], [right, high], 14, (above ? 0.2 : 0.32) * size, "spring"));
   if (damped) {
     const [a, b] = [left + 0.42 * (right - left), left + 0.58 * (right - left)];
-    const [y, h] = [-0.55 * size, 0.26 * size];
+    const [y, h] = above ? [0.18 * size, 0.16 * size] : [-0.55 * size, 0.26 * size];
     parts.push({ kind: "line", points: [[left, y], [a + 0.5 * (b - a), y]], role: "thin" });
     parts.push({ kind: "line", points: [[a + 0.5 * (b - a), y - 0.7 * h], [a + 0.5 * (b - a), y + 0.7 * h]], role: "thin" });
     parts.push({ kind: "polyline", points: [[a, y + h], [b, y + h], [b, y - h], [a, y - h]], role: "thin" });

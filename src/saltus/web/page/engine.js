@@ -57,6 +57,8 @@ export class PageSystem {
     this.period = frequency === undefined ? null : (2 * Math.PI) / frequency;
     // Behind the parameters: directions of frictions, and which coordinates are free.
     this.parameters = Float64Array.from([...numbers.map(({ path }) => this.values[path] ?? NaN), ...layout.modes]);
+    /** What the functions of the structure are given, once it has been asked for. @type {any[]|null} */
+    this.environment = null;
     const [breaks, table] = engine.loadTables(this.parameters);
     this.breaks = breaks;
     this.table = table;
@@ -195,7 +197,8 @@ export class Engine {
   /** What the functions of a structure are given of a system. @param {PageSystem} system */
   environment(system) {
     const pieces = BigInt(system.breaks.length + 1);
-    return [this.address("parameters"), this.address("constants"), this.address("breaks"), this.address("table"), pieces, BigInt(this.layout.records.width)];
+    system.environment ??= [this.address("parameters"), this.address("constants"), this.address("breaks"), this.address("table"), pieces, BigInt(this.layout.records.width)];
+    return system.environment;
   }
 
   /**

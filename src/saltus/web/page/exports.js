@@ -119,7 +119,7 @@ function signal(value) {
 
 /** A plot as SVG, as it is seen. @param {Plot} plot */
 export function asSvg(plot) {
-  plot.resize();
+  plot.drawNow();
   const ctx = new SvgContext(plot.width, plot.height);
   const palette = currentPalette();
   plot.paintBase(ctx, palette);
@@ -137,6 +137,7 @@ export function asCsv(columns) {
 
 /** A picture of both canvases of a plot, at twice its size or more. @param {Plot} plot @returns {Promise<Blob|null>} */
 export function asPng(plot) {
+  plot.drawNow();
   const [base, top] = [plot.base, plot.top];
   const whole = document.createElement("canvas");
   whole.width = base.width;

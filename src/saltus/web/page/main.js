@@ -15,7 +15,7 @@ import { Sweep } from "./sweep.js";
 import { BASIN_GRID, Basins } from "./basins.js";
 import { basinsLegend, basinsView, sweepControls, sweepSaid, sweepView } from "./laboratory.js";
 import { Choice, differingSaid, ofThisSystem, orbitSaid, paintBeneath, resultView } from "./results_view.js";
-import { currentPalette } from "./palette.js";
+import { currentPalette, forgetPalette } from "./palette.js";
 import { entriesOf, firstState, goesOn, isPeriodic, spaced, startEntries, tamed } from "./description.js";
 import { Embedding } from "./embedding.js";
 
@@ -54,8 +54,10 @@ export class Page {
     /** Which of the results is shown, or -1. */
     this.shownResult = -1;
     this.session.compute();
-    if (this.session.refusal && "state" in linked) this.store.state = this.first;
-    this.session.compute();
+    if (this.session.refusal && "state" in linked) {
+      this.store.state = this.first;
+      this.session.compute();
+    }
     this.stage = new Stage(at("stage"), this.session);
     this.stage.measure();
     this.transport = new Transport(at("transport"), this.session);
@@ -69,6 +71,7 @@ export class Page {
     this.follow();
     this.notice("refusal" in linked ? linked.refusal : "");
     this.drawAll();
+    this.drawnAt = performance.now(); // since the page was asked for
     if (description.embedded) new Embedding(this, window.parent);
   }
 
@@ -311,7 +314,7 @@ export class Page {
     store.on(["theme"], () => this.applyTheme());
     store.on(["values", "start", "periods", "cursor", "windows", "coordinate", "degrees", "ranges", "selected", "theme", "sweep", "speed"], () => this.address.later());
     addEventListener("resize", () => frame.before("views", () => this.drawAll()));
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.drawAll());
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.applyTheme());
     document.addEventListener("keydown", (event) => this.key(event));
   }
 
@@ -376,6 +379,7 @@ export class Page {
 
   applyTheme() {
     const { theme } = this.store.state;
+    forgetPalette();
     /** @type {HTMLSelectElement} */ (at("theme")).value = theme;
     if (theme === "system") delete document.documentElement.dataset.theme;
     else document.documentElement.dataset.theme = theme;

@@ -28,9 +28,8 @@ export class PageMotion {
     this.stop = mode === Mode.REST ? "rest" : "horizon";
     if (status !== Status.DONE) this.stop = layout.stops[status] ?? "not_finite";
     this.limit = status === Status.LIMITED ? (events.at(-1)?.contact ?? "") : "";
-    this.reason = (layout.refusals[status] ?? "")
-      .replaceAll("{time}", general(this.time.last, 9))
-      .replaceAll("{velocity}", general(this.end[dof] ?? NaN, 6));
+    const sentence = layout.refusals[status] ?? "";
+    this.reason = sentence && sentence.replaceAll("{time}", general(this.time.last, 9)).replaceAll("{velocity}", general(this.end[dof] ?? NaN));
     this.meaning = layout.stop_meanings[this.stop] ?? "";
     this.names = [...engine.names, ...engine.rates];
     /** @type {Validity|null} */

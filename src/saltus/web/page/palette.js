@@ -12,8 +12,22 @@
 
 const NAMES = ["paper", "ink", "soft", "faint", "stable", "unstable", "limit", "separatrix", "pale", "bar", "flash"];
 
-/** The colours that the style sheet gives now. @returns {Palette} */
+/** @type {Palette|null} */
+let kept = null;
+
+/** The colours that the style sheet gives now. */
 export function currentPalette() {
+  kept ??= readPalette();
+  return kept;
+}
+
+/** Other colours are in use from now on. */
+export function forgetPalette() {
+  kept = null;
+}
+
+/** @returns {Palette} */
+function readPalette() {
   const style = getComputedStyle(document.documentElement);
   const read = (/** @type {string} */ name) => style.getPropertyValue(`--${name}`).trim();
   const found = Object.fromEntries(NAMES.map((name) => [name, read(name)]));

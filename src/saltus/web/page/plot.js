@@ -54,6 +54,9 @@ export class Plot {
     this.ratio = 1;
     this.height = 0;
     this.stale = true;
+    this.onScreen = true;
+    this.measured = false;
+    watched(host, this);
     /** What there is to see, as it was when the picture was drawn. @type {Window|null} */
     this.all = null;
     followGestures(this);
@@ -61,6 +64,8 @@ export class Plot {
 
   /** Fit the canvases to their place; true where they changed. */
   resize() {
+    if (this.measured) return false;
+    this.measured = true;
     const box = this.host.getBoundingClientRect();
     const ratio = globalThis.devicePixelRatio || 1;
     const [width, height] = [Math.round(box.width), Math.round(box.height)];
@@ -86,8 +91,14 @@ export class Plot {
     return [x0, x1, y0, y1];
   }
 
-  /** Draw all, or with `onlyOver` only what moves. @param {boolean} onlyOver */
+  /** Draw all, or with `onlyOver` only what moves; a plot that is off the screen waits until it is seen. @param {boolean} onlyOver */
   draw(onlyOver = false) {
+    if (!onlyOver) this.stale = true;
+    if (this.onScreen) this.drawNow(onlyOver);
+  }
+
+  /** @param {boolean} onlyOver */
+  drawNow(onlyOver = false) {
     this.resize();
     if (!this.width) return;
     const palette = currentPalette();
@@ -160,6 +171,18 @@ export class Plot {
     this.readout.textContent = said || "";
     if (!point) this.options.leave?.();
   }
+}
+
+/** Let a plot know when its place changes its size, and when it comes onto the screen. @param {HTMLElement} host @param {Plot} plot */
+function watched(host, plot) {
+  new ResizeObserver(() => {
+    plot.measured = false;
+    plot.draw(true);
+  }).observe(host);
+  new IntersectionObserver((seen) => {
+    plot.onScreen = Boolean(seen.at(-1)?.isIntersecting);
+    if (plot.onScreen) plot.draw(true);
+  }).observe(host);
 }
 
 /** The rectangle inside the axes. @param {number} width @param {number} height */

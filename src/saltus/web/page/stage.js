@@ -37,6 +37,11 @@ export class Stage {
     /** @type {number[]} */
     this.reach = [];
     this.spoken = 0;
+    this.size = sizeOf(host);
+    new ResizeObserver(() => {
+      this.size = sizeOf(host);
+      this.draw();
+    }).observe(host);
   }
 
   /** How far the motion reaches in each coordinate, from its curve. */
@@ -64,9 +69,8 @@ export class Stage {
   }
 
   draw() {
-    const box = this.host.getBoundingClientRect();
     const ratio = globalThis.devicePixelRatio || 1;
-    const [width, height] = [Math.round(box.width), Math.round(box.height)];
+    const [width, height] = this.size;
     if (!width || !height) return;
     if (this.canvas.width !== Math.round(width * ratio) || this.canvas.height !== Math.round(height * ratio)) {
       this.canvas.width = Math.round(width * ratio);
@@ -136,6 +140,12 @@ export class Stage {
     const text = `The mechanism of ${session.description.model.name} at time ${shortly(session.store.state.cursor, 5)}: ${parts.join(", ")}`;
     this.canvas.setAttribute("aria-label", text);
   }
+}
+
+/** @param {HTMLElement} host @returns {[number, number]} */
+function sizeOf(host) {
+  const box = host.getBoundingClientRect();
+  return [Math.round(box.width), Math.round(box.height)];
 }
 
 /** Where a box of the mechanism stands in a picture, with equal scales. @param {Box} box @param {number} width @param {number} height */
