@@ -208,6 +208,20 @@ def test_impacts_without_an_inverse_are_refused(impact) -> None:
         reversed_system(forced().with_({"impact": impact}))
 
 
+def test_the_separatrices_of_a_rocking_block_have_the_energy_of_its_saddles_up_to_the_next_impact() -> None:
+    """v^2 / 2 + cos(alpha - |theta|) = 1. All of them come from overturned blocks."""
+    block = saltus.System(model=saltus.RockingBlock(alpha=0.3), impact=saltus.VelocityReduction(0.9))
+    found = separatrices(block, window=((-2.0, 2.0), (-2.0, 2.0)))
+    assert [(round(branch.saddle, 9), str(branch.end)) for branch in found] == [(s, "limit") for s in (-0.3, -0.3, 0.3, 0.3)]
+    assert sorted(len(branch.impacts) for branch in found) == [0, 0, 1, 1]
+    for branch in found:
+        first = branch.time >= branch.impacts[0, 0] if len(branch.impacts) else np.ones(branch.time.size, dtype=bool)
+        theta, velocity = branch.theta[first], branch.velocity[first]
+        assert first.sum() > 20
+        energy = velocity**2 / 2 + np.cos(0.3 - np.abs(theta))
+        assert np.abs(energy[np.isfinite(energy)][:-2] - 1).max() < 1e-10
+
+
 def test_without_damping_a_separatrix_has_the_energy_of_its_saddle() -> None:
     system = steady(C=0.0)
     energy = {e.theta: e.energy for e in equilibria(system)}

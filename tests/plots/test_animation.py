@@ -1,5 +1,6 @@
 """Films: a picture for each time, files of the kinds that are asked for, and refusals."""
 
+import io
 from itertools import pairwise
 
 import numpy as np
@@ -58,3 +59,18 @@ def test_what_is_no_film_is_refused(motion, tmp_path, monkeypatch):
         saltus.animate(motion, tmp_path / "film.avi")
     with pytest.raises(ParameterError, match="result must be a motion that was kept densely"):
         saltus.animate(saltus.simulate(SYSTEM, theta=0.3, periods=1, dense=False))
+
+
+def test_a_picture_is_that_of_a_whole_drawing(motion):
+    """What stands still is drawn once, and what moves on top of it."""
+    film = saltus.animate(motion, seconds=1.0, fps=5)
+    film._draw_was_started = True  # it is not shown here
+    page, pictures = film._fig, [io.BytesIO(), io.BytesIO()]
+    for number in (1, 3):
+        film._func(number)
+        page.savefig(pictures[0], format="rgba", dpi=page.dpi)
+    for artist in page.moving:
+        artist.set_animated(False)
+    page.canvas.print_rgba(pictures[1])
+    quick, whole = (np.frombuffer(picture.getvalue()[-page.canvas.buffer_rgba().nbytes :], np.uint8) for picture in pictures)
+    np.testing.assert_array_equal(quick, whole)

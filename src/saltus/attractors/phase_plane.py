@@ -19,7 +19,7 @@ from saltus.attractors.saddle_manifolds import MANIFOLDS, PLANE, has_left
 from saltus.attractors.stroboscopic_section import check_periodic
 from saltus.checks import check_number
 from saltus.errors import ParameterError
-from saltus.flow import Motion, simulate
+from saltus.flow import Motion, Stop, simulate
 from saltus.result import Result, result_dataset
 from saltus.systems import Box, Constant, System, Window, check_system, check_window, reversed_system
 
@@ -187,6 +187,7 @@ class SeparatrixEnd(StrEnum):
 
     WINDOW = "window"  # it has left the window for good
     SADDLE = "saddle"
+    LIMIT = "limit"  # a margin of the model ends all motions there, as that of an overturned block
     SPAN = "span"  # it was followed for all of the time asked for
 
 
@@ -255,8 +256,8 @@ def saddles(system: System, window: Box = PLANE) -> tuple[Equilibrium, ...]:
 def separatrices(system: System, window: Box = PLANE, *, span: float = 60.0, step: float = 0.02) -> tuple[Separatrix, ...]:
     """The stable manifolds of all saddles in a window: the curves that separate the basins under a constant load.
 
-    Each branch is followed back for at most a time `span`, until it leaves the window for good (three half widths) or comes to a
-    saddle; points are given every `step` of time.
+    Each branch is followed back for at most a time `span`, until it leaves the window for good (three half widths), comes to a
+    saddle or to a margin that ends all motions; points are given every `step` of time.
 
     Parameters
     ----------
@@ -308,6 +309,8 @@ def _branch(
             part, end = part[:, : back[0] + 1], SeparatrixEnd.SADDLE
         elif has_left(window, part[1:, -1:].T)[0]:
             end = SeparatrixEnd.WINDOW
+        elif motion.stop is Stop.LIMIT:
+            end = SeparatrixEnd.LIMIT
         left = left or bool(apart[-1] > 10.0 * SEPARATRICES.close)
         within = motion.impacts.time < part[0, -1] - now + step
         impacts.append(np.stack([now + motion.impacts.time, -motion.impacts.velocity_after], axis=1)[within])
@@ -321,6 +324,7 @@ def _branch(
 def _sampled(motion: Motion, begin: float, step: float) -> np.ndarray:
     """Rows (time, coordinate, velocity) of a motion, with both sides of every impact, and nan between them where they differ."""
     times = np.linspace(0.0, SEPARATRICES.span, round(SEPARATRICES.span / step) + 1)
+    times = np.append(times[times < motion.time], motion.time)
     theta, velocity = motion.at(times)
     impacts, contact = motion.impacts, float(motion.system.model.contact)
     rows = [np.stack([times, theta, velocity])]

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib import animation
+from matplotlib import animation, image
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Polygon
 
 from saltus.checks import check_number
 from saltus.errors import ParameterError, shown
-from saltus.plots.conventions import LOOK, NARROWEST, WIDEST, new_figure, style, symbol, unit_in_brackets
+from saltus.plots.conventions import LOOK, NARROWEST, WIDEST, style, symbol, unit_in_brackets
 from saltus.plots.motion import LINES, PAIRS, arcs, coordinates
 from saltus.progress import Progress, silent
 from saltus.systems import drawing_of
@@ -87,15 +90,17 @@ def animate(
     count = max(2, round(seconds * fps))
     with style():
         film = _Film(motion, np.linspace(motion.start, motion.time, count), width)
-        made = animation.FuncAnimation(film.figure, film.show, frames=count, interval=1000.0 / fps, blit=False)
+        made = animation.FuncAnimation(film.page, film.show, frames=count, interval=1000.0 / fps, blit=False)
         if file is None or writer is None:
             return made
         file.parent.mkdir(parents=True, exist_ok=True)
 
-        def seen(number: int, total: int) -> object:
-            return progress(number / max(total, 1), f"picture {number + 1} of {total}")
-
-        made.save(file, writer=writer, dpi=110, progress_callback=seen)  # 820 x 330 points, which a page shows without scaling
+        with writer.saving(film.page, str(file), 110):  # 820 x 330 points, which a page shows without scaling
+            for number in range(count):
+                progress(number / count, f"picture {number + 1} of {count}")
+                film.show(number)
+                writer.grab_frame()
+        made._draw_was_started = True  # type: ignore[attr-defined]  # or it warns that it was never shown
     progress(1.0, "film")
     return file
 
@@ -112,14 +117,49 @@ def _writer(file: Path, fps: Any) -> Any:
     return animation.PillowWriter(fps=fps) if kind == "pillow" else animation.FFMpegWriter(fps=fps)
 
 
+class _Page(Figure):
+    """A figure in which little moves: what stands still is drawn once for all pictures that writers ask for."""
+
+    moving: Sequence[Artist] = ()
+    still: Any = None
+
+    def savefig(self, fname: Any, **options: Any) -> None:
+        """As Matplotlib's; a picture for a writer, which is not a file of its own, is what stands still and what moves on top.
+
+        Parameters
+        ----------
+        fname
+            A file, or where to write.
+        options
+            As for `Figure.savefig`.
+        """
+        form = options.get("format")
+        if form not in ("rgba", "png") or isinstance(fname, (str, Path)):
+            super().savefig(fname, **options)
+            return
+        canvas = self.canvas if isinstance(self.canvas, FigureCanvasAgg) else FigureCanvasAgg(self)
+        if self.still is None or options.get("dpi", self.dpi) != self.dpi:
+            self.set_dpi(options.get("dpi", self.dpi))
+            canvas.draw()  # type: ignore[no-untyped-call]  # without what moves, which is animated
+            self.still = canvas.copy_from_bbox(self.bbox)  # type: ignore[no-untyped-call]
+        canvas.restore_region(self.still)  # type: ignore[no-untyped-call]
+        for artist in self.moving:
+            self.draw_artist(artist)
+        points = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
+        if form == "rgba":
+            fname.write(points.tobytes())
+        else:
+            image.imsave(fname, points, format=form)
+
+
 class _Film:
     """The figure of a film, and how it shows one of its times."""
 
     def __init__(self, motion: Any, times: np.ndarray, width: float) -> None:
         self.motion, self.times = motion, times
         self.places = np.atleast_2d(motion.at(times)[0])  # (degrees of freedom, n)
-        self.figure = new_figure(width, 0.4 * width)
-        mechanism, portrait = self.figure.subplots(1, 2, width_ratios=(1.2, 1))
+        self.page = _Page(figsize=(width / 25.4, 0.4 * width / 25.4), layout="constrained")
+        mechanism, portrait = self.page.subplots(1, 2, width_ratios=(1.2, 1))
         shapes = [drawing_of(motion.system, place) for place in self.places.T]
         self.shapes = shapes
         self.artists = [_artist(mechanism, shape) for shape in shapes[0]]
@@ -132,6 +172,10 @@ class _Film:
         mechanism.axis("off")
         self.title = mechanism.set_title("", loc="left")
         self._portrait(portrait)
+        moving = [*self.artists, self.title, *(line for line, *_ in self.lines), *self.dots]
+        self.page.moving = sorted(moving, key=lambda artist: artist.get_zorder())
+        for artist in self.page.moving:
+            artist.set_animated(True)
 
     def _portrait(self, ax: Axes) -> None:
         """The whole motion, faint, the part that was shown, and the states at the time that is shown."""
