@@ -90,6 +90,9 @@ RESULTS = {  # by the function that gives it
     "saltus.stability_chart": chart,
     "saltus.stable_manifold": lambda: saltus.stable_manifold(saddle(), window=((-1.0, 1.0), (-1.0, 1.0)), periods=5),
     "saltus.switch_branch": lambda: saltus.switch_branch(doubling(), (1.6, 1.8)),
+    "saltus.basin_integrity": lambda: saltus.basin_integrity(
+        saltus.basins_of_attraction(SYSTEM, theta=[-0.5, 0.5], velocity=[-0.5, 0.5])
+    ),
     "attractors.uncertainty_exponent": lambda: attractors.uncertainty_exponent(labels()),
     "attractors.unstable_manifold": lambda: attractors.unstable_manifold(saddle(), periods=5),
     "attractors.wada": lambda: attractors.wada(labels()),
@@ -115,7 +118,6 @@ WITHOUT = {
     **dict.fromkeys(("saltus.transmissibility", "saltus.zero_one_test", "saltus.stop_names", "attractors.basin_entropy"), NUMBER),
     **dict.fromkeys(("flow.load_releases", "flow.stroboscopic", "orbits.defects", "orbits.is_symmetric"), NUMBER),
     "studies.wrong_cells": NUMBER,
-    "saltus.basin_integrity": NUMBER,
     "studies.disagreements": "gives a part of what studies.bordered_chart gives",
     "studies.with_borders": "gives a part of what studies.bordered_chart gives",
     "saltus.branches_of": "gives branches, each as saltus.branch_of does",

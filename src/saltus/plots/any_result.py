@@ -8,7 +8,7 @@ from typing import Any
 
 from saltus.errors import ParameterError, shown
 from saltus.notebook import show_below_cell
-from saltus.plots.basins import draw_attractors, draw_basins, draw_uncertainty, draw_wada
+from saltus.plots.basins import draw_attractors, draw_basins, draw_integrity, draw_uncertainty, draw_wada
 from saltus.plots.chaos import draw_chaotic_bands, draw_exponents, draw_exponents_along, draw_verdict
 from saltus.plots.chart import draw_stability_chart
 from saltus.plots.conventions import LOOK, axes_or_new, figure_of, style
@@ -24,6 +24,7 @@ DRAWINGS: dict[str, Callable[..., Any]] = {
     "attractors": draw_attractors,
     "attractors along a parameter": draw_attractors_along,
     "backbone": draw_backbone,
+    "basin_integrity": draw_integrity,
     "basins": draw_basins,
     "bifurcation_diagram": draw_diagram,
     "branch": draw_branch,

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.lines import Line2D
+from matplotlib.patches import Circle
 from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import FormatStrFormatter, LogLocator, MaxNLocator, NullFormatter
 
@@ -166,6 +167,41 @@ def draw_basins(
     name_plane(ax, (x, y), unit_in_brackets(dataset[x]), steady(dataset))
     share, undecided = dataset["cells"].values, ("s", _percent(left)) if left else None
     attractor_legend(ax, own, dataset, colours, lambda i: f", {_percent(float(share[i]))}", undecided)
+    return ax
+
+
+@drawing
+def draw_integrity(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column) -> Axes:
+    """Draw the dataset of `basin_integrity`: the largest circle in each basin (solid), and the one around the attractor's state
+    that is nearest to another basin (dashed), with the measures; in the axes of `draw_basins` they lie on the basins."""
+    own, colours = ax is None, attractor_colours([int(n) for n in dataset["attractor"].values])
+    ax = axes_or_new(ax, width, 0.86 * width + 4.2 * min(len(colours), MOST_NAMED))
+    handles = []
+    for i, (number, colour) in enumerate(colours.items()):
+        for name, radius, line in (("centre", "factor", "-"), ("nearest", "distance", "--")):
+            place, size = dataset[name].values[i], float(dataset[radius].values[i])
+            if np.isfinite([*place, size]).all():
+                ax.add_patch(Circle(tuple(place), size, fill=False, edgecolor="white", linewidth=2.4, zorder=6))
+                ax.add_patch(
+                    Circle(
+                        tuple(place),
+                        size,
+                        fill=False,
+                        linestyle=line,
+                        linewidth=1.2,
+                        zorder=7,
+                        edgecolor=colour if own else LOOK.ink,
+                    )
+                )
+        ax.plot(*dataset["nearest"].values[i], **MARK | {"marker": MARKERS[i % len(MARKERS)], "zorder": 8})
+        area, factor, distance = (f"{float(dataset[name].values[i]):.3g}" for name in ("area", "factor", "distance"))
+        text = f"{number}: area {area}, largest circle {factor}, distance {distance}"
+        handles.append(_handle(MARKERS[i % len(MARKERS)], colour, text))
+    if own:
+        ax.autoscale_view()
+        x, y = dataset["plane"].values.tolist()
+        name_plane(ax, (str(x), str(y)), unit_in_brackets(dataset["centre"]), steady(dataset))
+        legend_of(ax, own, handles[:MOST_NAMED])
     return ax
 
 

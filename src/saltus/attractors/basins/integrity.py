@@ -42,8 +42,8 @@ def basin_integrity(basins: xarray.Dataset, curves: Iterable[Numbers] = ()) -> x
     Returns
     -------
     xarray.Dataset
-        Over `attractor`: `area`, `distance` (inf where there is no other basin), `factor` and its `centre` (two numbers), and
-        `distance_from_curve` (nan without a curve).
+        Over `attractor`: `area`, `distance` (inf where there is no other basin) and the `nearest` state of the attractor (two
+        numbers), `factor` and its `centre` (two numbers), and `distance_from_curve` (nan without a curve).
 
     Raises
     ------
@@ -70,15 +70,18 @@ def basin_integrity(basins: xarray.Dataset, curves: Iterable[Numbers] = ()) -> x
     for i, number in enumerate(basins["attractor"].values):
         own, states = label.ravel() == number, np.stack([basins[f"section_{name}"].values[i] for name in (x, y)], axis=1)
         states = states[np.isfinite(states).all(axis=1)]
-        from_cells, radius, centre = _in_grid(cells, own, states, (across, up))
+        from_cells, nearest, radius, centre = _in_grid(cells, own, states, (across, up))
         from_curve = min((_distance(line, state) for line in lines for state in states), default=np.nan)
-        rows.append((float(widths.ravel()[own].sum()), from_cells, radius, *centre, from_curve))
-    area, distance, factor, centre_x, centre_y, exact = np.array(rows).reshape(-1, 6).T
+        rows.append((float(widths.ravel()[own].sum()), from_cells, radius, *centre, *nearest, from_curve))
+    area, distance, factor, *places, exact = np.array(rows).reshape(-1, 8).T
+    centre, nearest = np.transpose(places[:2]), np.transpose(places[2:])
+    unit = str(basins[x].attrs.get("units", "1"))
     columns: dict[str, tuple[Any, ...]] = {
         "area": ("attractor", area, "1", "global integrity measure: area of the basin in the grid"),
         "distance": ("attractor", distance, "1", "local integrity measure: from the attractor to the nearest other cell"),
         "factor": ("attractor", factor, "1", "integrity factor: radius of the largest circle in the basin"),
-        "centre": (("attractor", "plane"), np.stack([centre_x, centre_y], axis=1), "1", "centre of this circle"),
+        "centre": (("attractor", "plane"), centre, unit, "centre of this circle"),
+        "nearest": (("attractor", "plane"), nearest, unit, "state of the attractor that is nearest to another cell"),
         "distance_from_curve": ("attractor", exact, "1", "from the attractor to the curves where basins meet"),
     }
     return result_dataset("basin_integrity", columns, {"attractor": basins["attractor"].values, "plane": [x, y]})
@@ -86,21 +89,24 @@ def basin_integrity(basins: xarray.Dataset, curves: Iterable[Numbers] = ()) -> x
 
 def _in_grid(
     cells: np.ndarray, own: np.ndarray, states: np.ndarray, axes: tuple[np.ndarray, np.ndarray]
-) -> tuple[float, float, np.ndarray]:
-    """The distance of the attractor's states from other cells; the largest circle of own cells, its radius and its centre."""
+) -> tuple[float, np.ndarray, float, np.ndarray]:
+    """The distance of the attractor's states from other cells, and the state nearest to them; the largest circle of own cells,
+    its radius and its centre."""
     from scipy.spatial import cKDTree
 
     edges = np.array([(a[0] - (a[1] - a[0]) / 2, a[-1] + (a[-1] - a[-2]) / 2) for a in axes])
     room = np.minimum(cells[own] - edges[:, 0], edges[:, 1] - cells[own]).min(axis=1)
-    away = np.inf
+    away, nearest = np.inf, states[0] if len(states) else np.full(2, np.nan)
     if not own.all():
         others = cKDTree(cells[~own])
-        away = float(others.query(states)[0].min(initial=np.inf)) if len(states) else np.inf
+        if len(states):
+            apart = others.query(states)[0]
+            away, nearest = float(apart.min()), states[int(np.argmin(apart))]
         room = np.minimum(room, others.query(cells[own])[0])
     if not own.any():
-        return 0.0, 0.0, np.full(2, np.nan)
+        return 0.0, nearest, 0.0, np.full(2, np.nan)
     best = int(np.argmax(room))
-    return away, float(room[best]), cells[own][best]
+    return away, nearest, float(room[best]), cells[own][best]
 
 
 def _curves(basins: Any, plane: tuple[str, str], curves: Iterable[Any]) -> list[np.ndarray]:
