@@ -19,16 +19,16 @@ system = saltus.System(
 motion = saltus.simulate(system, theta=0.3, periods=3)
 saltus.animate(motion, "metainterface.gif", seconds=1.0, fps=8)
 
-figure, axes = plt.subplots(1, 4, figsize=(9, 3), layout="constrained")  # four pictures of it
+figure, axes = plt.subplots(2, 2, layout="constrained")  # four pictures of it
 lengths = []
-for ax, time in zip(axes, (0.0, 5.0, 10.0, 15.0), strict=True):
+for ax, time in zip(axes.flat, (0.0, 5.0, 10.0, 15.0), strict=True):
     theta = motion.at(time)[0]
     for shape in drawing_of(system, [theta]):
         if shape.kind == "line":
             ax.plot(*shape.points.T, color="k" if shape.role == "bar" else "C0")
     bars = [shape.points for shape in drawing_of(system, [theta]) if shape.role == "bar"]
     lengths.append([np.hypot(*(end - start)) for start, end in bars])
-    ax.set(title=rf"$\tau={time:g}$, $\theta={theta:.2f}$ rad", aspect="equal", xlim=(-1.4, 2.8), ylim=(-0.3, 2.6))
+    ax.set(title=rf"$\tau={time:g}$, $\theta={theta:.2f}$ rad", aspect="equal", xlim=(-1.4, 2.8), ylim=(-0.8, 2.6))
     ax.axis("off")
 print(f"the lengths of the bars differ by {np.ptp(lengths, axis=0).max():.0e}")
 assert np.ptp(lengths, axis=0).max() < 1e-14

@@ -30,7 +30,7 @@ expected = math.sqrt(vee**2 - (you * friction) ** 2)
 print(f"{orbit}; Den Hartog's amplitude {expected:.9f}")
 branch = saltus.continue_orbit(saltus.find_orbit(lossy, x=0.5, velocity=0.0), "load.frequency", (0.6, 1.6))
 
-figure, (left, middle, right) = plt.subplots(1, 3, figsize=(10.5, 3.4), layout="constrained")
+figure, (left, middle, right) = plt.subplots(1, 3, figsize=(8, 3.2), layout="constrained")
 times = np.linspace(0.0, motion.time, 1500)
 x, v = motion.at(times)
 sticks = motion.to_xarray(times)["sliding_belt"].values == 0

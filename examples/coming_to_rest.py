@@ -25,7 +25,7 @@ expected = theory.final_time(period=period, e=e)
 
 print(f"{len(motion.impacts)} impacts followed one by one, at rest from tau = {motion.rest_time:.12f}")
 print(f"the paper's closed form for small amplitudes: {expected:.12f}")
-figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.4), layout="constrained")
+figure, (left, right) = plt.subplots(1, 2, figsize=(6.6, 3.6), layout="constrained")
 times = np.linspace(0.0, motion.rest_time, 4000)
 left.plot(times, motion.at(times)[0])
 left.set(xlabel=r"$\tau$", ylabel=r"$\theta$ (rad)")

@@ -35,6 +35,7 @@ load = saltus.Load(frequency=0.28, force=saltus.Harmonic(amplitude=0.05))
 motion = saltus.simulate(saltus.System(model=Chain(), load=load, impact=saltus.NewtonImpact(e=0.6)), **rest, periods=100)
 times = np.linspace(motion.time - 60.0, motion.time, 1500)
 plt.plot(times, np.transpose(motion.at(times)[0])[:, -1])
+plt.gca().set(xlabel=r"time $\tau$", ylabel="$x_{10}$, stop at 0.2")
 print(f"error without impacts {error:.0e}; {len(motion.events)} events in 100 periods")
 assert error < 1e-12
 assert len(motion.events) >= 50

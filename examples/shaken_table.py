@@ -42,7 +42,7 @@ places = {str(point.kind): point.parameter for point in branch.special}
 print(f"born at {places['LP']:.12f}, doubled at {places['PD']:.12f}")
 
 times = np.linspace(motion.start, motion.time, 600)
-figure, (ax, diagram) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+figure, (ax, diagram) = plt.subplots(1, 2, figsize=(7, 3.6), layout="constrained")
 ax.plot(times, motion.at(times)[0], label="ball")
 ax.plot(times, load.ground(times), "0.6", label="table")
 ax.set(xlabel=r"$\tau$", ylabel="height", ylim=(None, 7.5))

@@ -24,7 +24,7 @@ for slope in B:
 order = -np.polyfit(np.log(B[1:]), np.log(errors[1:]), 1)[0]
 print(f"error ~ B^-{order:.3f}")
 
-figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.6), layout="constrained")
+figure, (left, right) = plt.subplots(1, 2, figsize=(6.6, 3.6), layout="constrained")
 left.loglog(B, errors, "o-")
 left.xaxis.set_minor_formatter(plt.NullFormatter())
 left.set(xlabel="slope $B$ of the smoothed sign", ylabel="error after 5 periods")

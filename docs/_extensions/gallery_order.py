@@ -2,7 +2,7 @@
 
 import matplotlib.pyplot as plt
 
-from saltus.plots.conventions import RC
+from saltus.plots.conventions import LOOK, RC
 
 TASKS = (  # what people do after their first motion, named in the gallery's first paragraph
     *("preloaded_stop", "at2_record", "overturning_spectrum", "harvester", "identification", "basins"),
@@ -37,4 +37,6 @@ def reset(_, __):
     plt.rcdefaults()
     letters = {name: size + 3.0 for name, size in RC.items() if name.endswith("size") and "major" not in name}
     plt.rcParams.update(RC | letters | {"figure.figsize": (5.6, 4.0), "figure.dpi": 100, "savefig.dpi": 140})
+    colours = [LOOK.stable, LOOK.unstable, LOOK.limit, "#e08214", "#7b5ea7", "#5f6b76"]  # those of saltus.plot first
+    plt.rcParams["axes.prop_cycle"] = plt.cycler(color=colours)
     plt.rcParams["figure.constrained_layout.use"] = True
