@@ -116,15 +116,18 @@ def as_start(system, start):
     return {name: value for name, value in start.items() if name in names} | {f"{names[0]}_velocity": start.get("velocity", 0.0)}
 
 
-def in_node(tasks, folder):
-    file = Path(folder) / "tasks.json"
-    file.write_text(json.dumps(tasks))
-    command = [str(NODE), "--experimental-default-type=module", str(Path(__file__).parent / "agreement.mjs")]
-    done = subprocess.run(
-        [*command, (one_file.PAGE / "engine.js").as_uri(), str(file)], capture_output=True, text=True, timeout=300
-    )
+def run_node(script, address, given, folder):
+    """What a script beside this file prints as JSON, which is given an address and a file; bytes are given in base64."""
+    file = Path(folder) / "given.json"
+    file.write_text(json.dumps(given, default=lambda content: base64.b64encode(content).decode()))
+    command = [str(NODE), "--experimental-default-type=module", str(Path(__file__).parent / script), address, str(file)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr[-2000:]
     return json.loads(done.stdout)
+
+
+def in_node(tasks, folder):
+    return run_node("agreement.mjs", (one_file.PAGE / "engine.js").as_uri(), tasks, folder)
 
 
 def events_of(motion):
@@ -182,7 +185,7 @@ def check(seed, each, kinds, folder):
             {"values": system.parameters, "start": as_start(system, start), **length_of(system), "at": AT}
             for system, start in made
         ]
-        tasks.append({"wasm": base64.b64encode(wasm).decode(), "description": description, "motions": motions})
+        tasks.append({"wasm": wasm, "description": description, "motions": motions})
         known.append(made)
     counts, whole = 0, 0
     for made, found in zip(known, in_node(tasks, folder), strict=True):

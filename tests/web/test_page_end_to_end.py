@@ -116,6 +116,33 @@ def test_what_python_refuses_is_refused_beside_its_field_in_the_same_sentence(pa
     assert page.evaluate("saltusPage.session.motion.end") == before
 
 
+@pytest.mark.parametrize(
+    ("path", "typed"),
+    [
+        ("load.frequency", "1e300"),
+        ("load.frequency", "1e-300"),
+        ("model.beta0", "1e-300"),
+        ("load.horizontal.amplitude", "-1e120"),
+        ("start.theta_velocity", "1e90"),
+        ("start.time", "1e99"),
+        ("start.periods", "1e9"),
+        ("model.damping", "NaN"),
+        ("impact.e", "<b>"),
+    ],
+)
+def test_what_cannot_be_followed_is_said_and_nothing_breaks(page, path, typed):
+    page.type(field(path), typed)
+    page.evaluate(SETTLED)
+    refused = text(page, field(path, ".refusal"))
+    stop, last = page.evaluate("[saltusPage.session.motion.stop, saltusPage.session.motion.time.last]")
+    assert refused or stop not in ("horizon", "rest") or last > 0
+    if stop not in ("horizon", "rest"):
+        assert re.search("It ends|It is not followed", text(page, "#summary"))
+    page.type(field(path), "0.5")  # and it goes on
+    page.evaluate(SETTLED)
+    assert page.evaluate("saltusPage.session.motion.time.last") > 0
+
+
 def test_a_slider_is_dragged_and_moved_by_keys(page):
     slider = f"document.querySelector('{field('model.damping', '.slider')}')"
     page.evaluate(f"{slider}.scrollIntoView({{block: 'center'}})")
@@ -134,7 +161,8 @@ def test_a_slider_is_dragged_and_moved_by_keys(page):
 
 
 def test_what_is_selected_in_one_view_is_marked_in_all(page):
-    pictures = """['phase', 'history', 'section', 'energy'].map((id) => saltusPage.plotOf(id).top.toDataURL())"""
+    pictures = """['phase', 'history', 'section', 'energy'].map((id) => saltusPage.plotOf(id)).map((plot) => {
+        plot.drawNow(true); return plot.top.toDataURL(); })"""
     before = page.evaluate(pictures)
     left, top = place(page, "history", 30.0, 0.0)
     page.point("mouseMoved", left, top)

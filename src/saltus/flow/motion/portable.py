@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from saltus.checks import LIMITS
 from saltus.errors import SaltusError
 from saltus.flow.contacts.layout import ContactColumn, FrictionColumn
 from saltus.flow.kernel.compiled import (
@@ -114,6 +115,7 @@ class PortableMotion:
             **{kind.__name__: {member.name: int(member) for member in kind} for kind in ENUMERATIONS},
             "record": places,
             "record_size": MOTION.itemsize,
+            "most_size": LIMITS.value,
             "most_order": MOST_COEFFICIENTS - 2,
             "arguments": self.kernel.arguments,
             "several": trace.several,

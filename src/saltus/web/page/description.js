@@ -2,12 +2,16 @@
 
 import { MOST_PERIODS } from "./session.js";
 import { withinBounds } from "./checks.js";
+import { clamp } from "./numbers.js";
 
 /** @typedef {import("./types.js").Description} Description */
 /** @typedef {import("./types.js").State} State */
 /** @typedef {import("./types.js").NumberEntry} NumberEntry */
 
 const FIRST_SPEED = 4; // units of time per second
+
+/** How many values a sweep may have each way, and periods at each. @type {{count: [number, number], periods: [number, number]}} */
+export const SWEPT = { count: [2, 2000], periods: [1, MOST_PERIODS] };
 
 /** What Python wrote, with every group of numbers as entries and with what may be left out filled in. @param {any} written @returns {Description} */
 export function prepared(written) {
@@ -84,7 +88,8 @@ export function tamed(state, description) {
   const result = state.selected && description.results?.[state.selected.result];
   const points = result?.branches?.[state.selected?.branch ?? -1]?.parameter.length ?? 0;
   const selected = state.selected && state.selected.point < points ? state.selected : null;
-  return { ...state, coordinate, selected, periods: Math.min(Math.max(state.periods, 1e-9), MOST_PERIODS), speed: Math.min(Math.max(state.speed, 1e-3), 1e3) };
+  const sweep = { ...state.sweep, count: clamp(state.sweep.count, ...SWEPT.count), periods: clamp(state.sweep.periods, ...SWEPT.periods) };
+  return { ...state, coordinate, selected, sweep, periods: clamp(state.periods, 1e-9, MOST_PERIODS), speed: clamp(state.speed, 1e-3, 1e3) };
 }
 
 /** A class's name in words: WallOscillator as wall oscillator. @param {string} name */

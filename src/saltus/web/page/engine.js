@@ -16,7 +16,7 @@ import { BUFFER, Refusal, Run } from "./run.js";
  * @property {Enumeration} Mode @property {Enumeration} Status @property {Enumeration} EventCode
  * @property {Enumeration} ContactColumn @property {Enumeration} FrictionColumn
  * @property {Record<string, [number, boolean]>} record  The place of each number of the motion, and whether it is whole.
- * @property {number} record_size @property {number} most_order @property {Argument[]} arguments @property {boolean} several
+ * @property {number} record_size @property {number} most_size @property {number} most_order @property {Argument[]} arguments @property {boolean} several
  * @property {Record<string, number>} sizes @property {number} constant_count @property {number[]} modes @property {number[]} signs
  * @property {number[]} contact_coordinates @property {number[]} friction_coordinates
  * @property {number} positions_at @property {number} grounds_at @property {number} contact_numbers

@@ -3,7 +3,7 @@
 import { parameterName, parameterSymbol, symbolOf } from "./symbols.js";
 import { rangeOf, shortly, typedNumber } from "./numbers.js";
 import { axisName } from "./views.js";
-import { goesOn } from "./description.js";
+import { SWEPT, goesOn } from "./description.js";
 import { jumpsOf } from "./sweep.js";
 import { button } from "./transport.js";
 
@@ -26,7 +26,14 @@ export function sweepControls(host, session, entries, sweep) {
   host.append(choice);
   const said = document.createElement("p");
   for (const [name, label] of /** @type {const} */ ([["low", "from"], ["high", "to"], ["count", "values"], ["periods", "periods at each"]])) {
-    host.append(setting(label, () => store.state.sweep[name], (value) => store.set({ sweep: { ...store.state.sweep, [name]: value } }), said, store));
+    const allowed = name === "count" || name === "periods" ? SWEPT[name] : null;
+    const write = (/** @type {number} */ value) => {
+      const refused = allowed && !(value >= allowed[0] && value <= allowed[1]);
+      if (refused) return `${label} must lie in [${allowed.join(", ")}], got ${value}`;
+      store.set({ sweep: { ...store.state.sweep, [name]: value } });
+      return "";
+    };
+    host.append(setting(label, () => store.state.sweep[name], write, said, store));
   }
   const run = button(host, "run", "Sweep up and down", () => (sweep.result.done ? sweep.start() : sweep.stop()));
   said.className = "said";
@@ -36,7 +43,7 @@ export function sweepControls(host, session, entries, sweep) {
 }
 
 /**
- * One number of a laboratory. @param {string} label @param {() => number} read @param {(value: number) => void} write
+ * One number of a laboratory. @param {string} label @param {() => number} read @param {(value: number) => string} write sets it, or says why not
  * @param {HTMLElement} said @param {import("./store.js").Store} store
  */
 function setting(label, read, write, said, store) {
@@ -47,8 +54,7 @@ function setting(label, read, write, said, store) {
   input.value = String(read());
   input.addEventListener("change", () => {
     const found = typedNumber(input.value, { name: label });
-    said.textContent = "refusal" in found ? found.refusal : "";
-    if ("value" in found) write(found.value);
+    said.textContent = "refusal" in found ? found.refusal : write(found.value);
     input.value = String(read());
   });
   store.on(["sweep"], () => (input.value = String(read())));

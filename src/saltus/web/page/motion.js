@@ -10,8 +10,8 @@ const STEP_SAMPLES = 12; // in each step, to find changes of sign: as many as Py
 const HALVINGS = 60; // of a bracket of a change of sign: to rounding
 
 export class PageMotion {
-  /** @param {import("./run.js").Run} run @param {Steps} steps @param {PageEvent[]} events @param {number} status */
-  constructor(run, steps, events, status) {
+  /** @param {import("./run.js").Run} run @param {Steps} steps @param {PageEvent[]} events @param {number} status @param {boolean} unfinished whether the page gave up, not the kernel */
+  constructor(run, steps, events, status, unfinished) {
     const { engine } = run;
     const { layout, dof } = engine;
     const { Mode, Status } = layout;
@@ -26,11 +26,12 @@ export class PageMotion {
     const resting = mode === Mode.REST || mode === Mode.CHATTER;
     this.side = !engine.several && resting ? 0 : record.get("side");
     this.stop = mode === Mode.REST ? "rest" : "horizon";
-    if (status !== Status.DONE) this.stop = layout.stops[status] ?? "not_finite";
+    if (unfinished) this.stop = "unfinished";
+    else if (status !== Status.DONE) this.stop = layout.stops[status] ?? "not_finite";
     this.limit = status === Status.LIMITED ? (events.at(-1)?.contact ?? "") : "";
     const sentence = layout.refusals[status] ?? "";
     this.reason = sentence && sentence.replaceAll("{time}", general(this.time.last, 9)).replaceAll("{velocity}", general(this.end[dof] ?? NaN));
-    this.meaning = layout.stop_meanings[this.stop] ?? "";
+    this.meaning = unfinished ? "the page follows a motion for no more than two seconds of computing" : (layout.stop_meanings[this.stop] ?? "");
     this.names = [...engine.names, ...engine.rates];
     /** @type {Validity|null} */
     this.checked = null;

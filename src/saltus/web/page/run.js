@@ -12,7 +12,8 @@ import { Steps } from "./steps.js";
 
 export const BUFFER = 1024; // steps, and events, that one call of the kernel may record
 const MOST_EVENTS = 200000; // of a motion that is drawn
-const MOST_STEPS = 2000000;
+const LONGEST = 2000; // milliseconds of computing for one motion: a reader waits for it
+const MOST_PERIODS = 2 ** 53; // from time 0: beyond, a number is no longer told from the next one
 
 /** What Python would refuse, with its sentence. */
 export class Refusal extends Error {
@@ -42,7 +43,18 @@ export class Run {
     this.first = start.time ?? 0;
     this.order = taylorOrder(this.tolerance);
     this.length = system.period ?? 0;
+    this.check(duration);
     this.begin(this.clock(duration, options.periods), options.side ?? 0);
+  }
+
+  /** What Python refuses before it begins. @param {number} duration */
+  check(duration) {
+    const { names, rates, layout } = this.engine;
+    const given = { time: this.first, ...zipped(names, this.position), ...zipped(rates, this.speeds) };
+    const bad = Object.entries(given).find(([, value]) => !(Math.abs(value) <= layout.most_size));
+    if (bad) throw new Refusal(bad[0], `${bad[0]} must be at most ${general(layout.most_size)} in size, got ${general(bad[1])}`);
+    const reach = this.length ? (Math.abs(this.first) + Math.abs(duration)) / this.length : 0;
+    if (!(reach < MOST_PERIODS)) throw new Refusal("time", `the motion must start and end within 2^53 forcing periods, got ${general(reach)} of them`);
   }
 
   /** When the motion starts and ends: forcing periods, and times within them. @param {number} duration @param {number} [periods] */
@@ -159,19 +171,21 @@ export class Run {
   /** Run to the end. */
   motion() {
     const { engine } = this;
-    const { FULL, PAUSED, UNRESOLVED = 0 } = engine.layout.Status;
+    const { FULL, PAUSED } = engine.layout.Status;
+    const begun = performance.now();
     const steps = new Steps(engine.dof, this.order + 2, this.length);
     /** @type {PageEvent[]} */
     const events = [];
     let status = FULL ?? 0;
-    while (status === FULL || status === PAUSED) {
+    let whole = true;
+    while (whole && (status === FULL || status === PAUSED)) {
       engine.exports.rewind(engine.top);
       status = engine.exports.advance(engine.request);
       this.empty(steps, events);
-      if (events.length > MOST_EVENTS || steps.count > MOST_STEPS) status = UNRESOLVED;
+      whole = events.length <= MOST_EVENTS && performance.now() - begun < LONGEST;
     }
     steps.settle();
-    return new PageMotion(this, steps, events, status);
+    return new PageMotion(this, steps, events, status, status === FULL || status === PAUSED);
   }
 
   /** Empty the buffers. @param {Steps} steps @param {PageEvent[]} events */
@@ -206,4 +220,9 @@ export class Run {
     const [before, after] = [row.slice(1, 1 + dof), row.slice(1 + dof, 1 + 2 * dof)];
     return { time, kind, contact: both ? "both" : chosen.join("+"), side, before, after, impulse: row.slice(1 + 2 * dof) };
   }
+}
+
+/** @param {string[]} names @param {number[]} values @returns {Record<string, number>} */
+function zipped(names, values) {
+  return Object.fromEntries(names.map((name, i) => [name, values[i] ?? NaN]));
 }

@@ -20,6 +20,7 @@ const STOPS = {
   not_finite: "It ends: the motion leaves the range of numbers.", stalled: "It ends: the acceleration is singular.",
   singular: "It ends: the mass matrix has no inverse.", outside: "There is no motion: the state at the start lies beyond the contact.",
   unresolved: "It ends: impacts accumulate too slowly to be followed.",
+  unfinished: "It is not followed further here, as that takes too long; Python follows it to its end.",
 };
 
 /** The margins that are passed at a time. @param {Session} session @param {number} time */
