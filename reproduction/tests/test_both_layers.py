@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from saltus_paper.figures.both_layers import FATES, beside, embedded, stable_states
+from saltus import simulate
+from saltus_paper.figures.both_layers import FATES, FIGURE, beside, embedded, stable_states
 from saltus_paper.figures.harmonic_loads import AMPLITUDE, FREQUENCY, under_force
 
 
@@ -13,6 +14,13 @@ def test_a_state_of_the_reduced_model_opens_the_layer_of_its_sign():
     states = np.array([[0.3, -0.1], [-0.3, 0.1], [0.0, 0.2], [0.0, -0.2]])
     expected = [[0.3, 0.0, -0.1, 0.0], [0.0, -0.3, 0.0, 0.1], [0.0, 0.0, 0.2, 0.0], [0.0, 0.0, 0.0, -0.2]]
     np.testing.assert_array_equal(embedded(states), expected)
+
+
+def test_the_page_begins_where_the_closed_layer_opens():
+    system, results, first = FIGURE.page(None)
+    motion = simulate(system, **first)
+    assert results == []
+    assert (motion.to_xarray()["closed_contacts"].values == 0).any()
 
 
 def test_steady_motions_are_exact_up_to_the_load_that_opens_the_closed_layer():

@@ -1,6 +1,8 @@
 """Figs. 14 and 15 from coarse charts: their data say what they are, their claims follow from them, their pictures are whole."""
 
 import functools
+import json
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,6 +11,7 @@ import xarray as xr
 from claim_verdicts import claims_of, verdicts
 from picture_checks import check_provenance, clipped
 
+import saltus
 from saltus.attractors import lyapunov_many
 from saltus.files import write_dataset
 from saltus.flow import Ending, find_recurrence
@@ -44,6 +47,19 @@ def test_the_data_say_what_they_are_and_claims_follow_from_disk_too(tmp_path):
         stored = tree.load()
     assert figure.claims(stored) == claims
     assert clipped(figure.draw(stored)) == []
+
+
+def test_its_page_has_every_chart_with_all_its_cells(tmp_path):
+    system, charts, first = FIGURES["fig14"].page(data())
+    file = saltus.page(system, *charts, path=tmp_path / "fig14.html", **first)
+    shown = json.loads(re.search(r'id="description">(.*?)</script>', file.read_text(), re.DOTALL)[1])["results"]
+    assert [chart["title"] for chart in shown] == ["Fig. 14d", "Fig. 14f"]
+    for chart, panel in zip(shown, data().children.values(), strict=True):
+        amplitude = panel["chart"]["amplitude"].transpose("horizontal", "vertical").values
+        np.testing.assert_array_equal(np.array(chart["cells"], dtype=float), amplitude)
+        assert chart["values"]["load.frequency"] == panel.attrs["frequency"]
+        started = [[start is not None for start in row] for row in chart["starts"]]
+        np.testing.assert_array_equal(started, np.isfinite(amplitude))
 
 
 def test_claims_that_a_coarse_chart_bears_hold():

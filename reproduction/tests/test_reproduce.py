@@ -82,6 +82,8 @@ def test_a_draft_is_marked_and_made_anew_in_full(tmp_path, monkeypatch):
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "Draft: 1 of 1 parts" in page
     assert "samples = 300" in page
+    assert '<a href="fig04.html">Move it</a>' in page
+    assert '"title": "Separatrix"' in (tmp_path / "fig04.html").read_text(encoding="utf-8")
     assert not reproduce(["fig04"], tmp_path, effort="quick")[0].made
     assert "Draft: 1 of 1 parts" in (tmp_path / "report.html").read_text(encoding="utf-8")
     assert reproduce(["fig04"], tmp_path)[0].made

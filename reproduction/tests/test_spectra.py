@@ -4,6 +4,7 @@ import pytest
 import xarray as xr
 from picture_checks import check_provenance, clipped
 
+import saltus
 from saltus.files import write_dataset
 from saltus_paper import FIGURES, ClaimVerdict
 
@@ -38,6 +39,10 @@ def test_the_claims_hold_also_from_disk_and_the_picture_is_whole(name, tmp_path)
         stored = tree.load()
     assert figure.claims(stored) == claims
     assert clipped(figure.draw(stored)) == []
+    if figure.page is not None:
+        system, spectra, first = figure.page(stored)
+        content = saltus.page(system, *spectra, path=tmp_path / f"{name}.html", **first).read_text()
+        assert all(f'"title": "Fig. {name[3:].lstrip("0")}{panel}"' in content for panel in data.children)
 
 
 def test_claims_fail_where_the_data_do_not_bear_them():

@@ -71,6 +71,17 @@ def joined(panels: Mapping[str, xr.DataTree], *, what: str) -> xr.DataTree:
     return xr.DataTree.from_dict(parts)
 
 
+def named(result: Any, title: str) -> Any:
+    """A result with a title of its own, by which pages call it."""
+    return result.copy().assign_attrs(title=title) if isinstance(result, xr.Dataset) else _renamed(result, title)
+
+
+def _renamed(tree: xr.DataTree, title: str) -> xr.DataTree:
+    copied = tree.copy()
+    copied.attrs = {**tree.attrs, "title": title}
+    return copied
+
+
 def with_groups(tree: xr.DataTree, groups: Mapping[str, xr.Dataset]) -> xr.DataTree:
     """A tree with further datasets as its children."""
     return tree.assign({name: xr.DataTree(data) for name, data in groups.items()})

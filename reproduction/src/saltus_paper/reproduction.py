@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from saltus import ParameterError, save
+from saltus import ParameterError, page, save
 from saltus.flow import available_cores
 from saltus.plots import style
 from saltus_paper import up_to_date as state
@@ -114,6 +114,9 @@ def _write(figure: PaperFigure, data: Any, output: Path) -> None:
     save(output / f"{figure.name}.nc", data)
     if figure.table is not None:
         save(output / f"{figure.name}.md", figure.table(data))
+    if figure.page is not None:
+        system, results, first = figure.page(data)
+        page(system, *results, path=output / f"{figure.name}.html", title=figure.title, **first)
     if figure.draw is not None:
         picture = figure.draw(data)
         with style():

@@ -69,8 +69,9 @@ def _one(data: Any, system: System) -> dict[str, Any]:
     check_provenance(data.attrs, own, f"the {kind.replace('_', ' ')}")
     if not differ_in_numbers(own, system):
         raise ParameterError(f"the {kind.replace('_', ' ')} is of another system: its loads or impact law differ", "results")
-    title = kind.replace("_", " ").capitalize()
-    common = {"title": str(data.attrs.get("title", title)), "digest": digest(system), "values": dict(numbers(own))}
+    title = str(data.attrs.get("title", ""))
+    title = kind.replace("_", " ").capitalize() if title.endswith("computed by saltus") or not title else title
+    common = {"title": title, "digest": digest(system), "values": dict(numbers(own))}
     return common | READERS[kind](data)
 
 

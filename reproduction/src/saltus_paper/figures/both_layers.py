@@ -15,7 +15,7 @@ from saltus_paper.claims.claim import Measured, measured
 from saltus_paper.figure_data import dataset, joined
 from saltus_paper.figures import fig04, fig05
 from saltus_paper.figures.both_layers_panels import MEANINGS, draw
-from saltus_paper.figures.figure import paper_figure
+from saltus_paper.figures.figure import LivingPage, paper_figure
 from saltus_paper.figures.harmonic_loads import AMPLITUDE, FREQUENCY, under_force
 from saltus_paper.figures.phase_portraits import constant_load
 
@@ -220,6 +220,11 @@ def stable_states() -> Any:
     )
 
 
+def page(data: Any) -> LivingPage:
+    """Both layers at a place of Fig. 9 at which the closed layer opens: both angles, each with its impacts."""
+    return full(under_force(0.85, 0.5), *REFERENCE), [], {"theta": (0.6, 0.0), "velocity": (0.0, 0.0), "periods": 40}
+
+
 def exact_below(data: Any, frequency: float) -> tuple[float, float]:
     """The largest Hhat of the map up to which all attractors are exact, at the nearest frequency, and the next Hhat."""
     near = data[FREQUENCY].values[np.abs(data[FREQUENCY].values - frequency).argmin()]
@@ -263,4 +268,4 @@ def measure(data: Any) -> dict[str, Measured]:
     }
 
 
-FIGURE = paper_figure("both_layers", quick={"size": 13}, compute=compute, draw=draw, measure=measure)
+FIGURE = paper_figure("both_layers", quick={"size": 13}, compute=compute, draw=draw, measure=measure, page=page)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from saltus import System
 from saltus.plots import (
     LOOK,
     border_curves,
@@ -23,8 +24,8 @@ from saltus.plots import (
 from saltus.studies import bordered_chart, wrong_cells
 from saltus.theory import high_frequency_onset
 from saltus_paper.claims.claim import Measures
-from saltus_paper.figure_data import joined
-from saltus_paper.figures.figure import PaperFigure, paper_figure
+from saltus_paper.figure_data import joined, named
+from saltus_paper.figures.figure import LivingPage, PaperFigure, paper_figure
 from saltus_paper.figures.harmonic_loads import under_force
 from saltus_paper.panel_work import Panels
 
@@ -49,6 +50,7 @@ def chart_figure(
         panels=partial(_panels, charts=charts),
         join=partial(joined, what="stability charts under load (i)"),
         draw=partial(_draw, height=height),
+        page=partial(_page, name=f"Fig. {name[3:]}"),
         measure=measure,
         quick={"size": 36, "curves": 1},
         module=module,
@@ -70,6 +72,12 @@ def panel(
     tree["static"].attrs |= {"what": "quasi-static borders", "saltus_version": tree["chart"].attrs["saltus_version"]}
     tree.attrs = {"system": here.to_json(), "beta0_degrees": beta0, "damping": damping, "frequency": frequency}
     return tree
+
+
+def _page(data: Any, name: str) -> LivingPage:
+    """All charts, and a motion of the first one's system."""
+    charts = [named(tree["chart"].to_dataset(), f"{name}{panel}") for panel, tree in data.children.items()]
+    return System.from_json(charts[0].attrs["system"]), charts, {"theta": 0.3, "periods": 40}
 
 
 @styled

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from saltus import separatrices
 from saltus.plots import LOOK, new_figure, panel_label, styled
 from saltus_paper.claims.claim import Measured, measured
 from saltus_paper.figure_data import TOLERANCE, tree
-from saltus_paper.figures.figure import paper_figure
+from saltus_paper.figures.figure import LivingPage, paper_figure
 from saltus_paper.figures.phase_portraits import BETA0, VERTICAL, circled, closed, constant_load, draw_portrait, outward, portrait
 
 BOUND = 2.55  # rad, a little outside the axes
@@ -45,6 +46,13 @@ def draw(data: Any) -> Any:
         panel_label(ax, name)
         ax.set_ylabel(r"$\dot\theta$")
     return figure
+
+
+def page(data: Any) -> LivingPage:
+    """The system of (c) with the curves between the basins of its three equilibria, and the first of its motions."""
+    system, (theta, velocity) = systems()["c"], STARTS["c"][-2]
+    between = separatrices(system, window=((-BOUND, BOUND), (-1.0, 1.0)), step=0.1)
+    return system, list(between), {"theta": theta, "velocity": velocity, "duration": DURATIONS["c"]}
 
 
 def _corner_error(group: Any) -> float:
@@ -112,4 +120,4 @@ def _loop_shift(first: Any, second: Any) -> float:
     return max(float(np.abs(one - two).max()) if one.shape == two.shape else np.inf for one, two in pairs)
 
 
-FIGURE = paper_figure("fig04", compute=compute, draw=draw, measure=measure)
+FIGURE = paper_figure("fig04", compute=compute, draw=draw, measure=measure, page=page)

@@ -25,7 +25,7 @@ from saltus_paper.claims.claim import Measured, measured
 from saltus_paper.figure_data import joined
 from saltus_paper.figures.figure import paper_figure
 from saltus_paper.figures.harmonic_loads import BETA0, VERTICAL, under_force
-from saltus_paper.figures.response_panels import spectrum
+from saltus_paper.figures.response_panels import diagrams_page, spectrum
 from saltus_paper.figures.zooms import draw_zoom
 from saltus_paper.measures import chaos_measures, response_measures
 from saltus_paper.measures.spectrum_features import detached
@@ -135,4 +135,5 @@ def static_unit(panels: Mapping[float, Any]) -> Measured:
     return measured(max(residuals, default=np.inf), panels=rows)
 
 
-FIGURE = paper_figure("fig09", quick={"effort": "quick"}, panels=panels, join=join, draw=draw, measure=measure)
+PAGE = partial(diagrams_page, name="Fig. 9", first="b")
+FIGURE = paper_figure("fig09", quick={"effort": "quick"}, panels=panels, join=join, draw=draw, measure=measure, page=PAGE)

@@ -8,11 +8,13 @@ from functools import partial
 from operator import itemgetter
 from typing import Any
 
+from saltus import System
 from saltus_paper.claims.claim import Claim, Measures, judge
 from saltus_paper.panel_work import Panels, compute_panels
 from saltus_paper.toml_tables import toml_table
 
 EFFORTS = ("standard", "quick")
+LivingPage = tuple[System, list[Any], dict[str, Any]]  # what `saltus.page` takes: what moves, results, and the first motion
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -23,7 +25,8 @@ class PaperFigure:
        results by the panels' names: every number behind the picture, with units;
     2. `draw(data)` returns a matplotlib Figure from nothing but that data, or is None where there is nothing to draw;
     3. `measure(data)` returns the numbers for its claims, again from nothing but the data; the tables of claims hold the rest;
-    4. `table(data)`, where given, returns Markdown.
+    4. `table(data)`, where given, returns Markdown;
+    5. `page(data)`, where given, returns what a page is made of on which one moves the numbers and computes the motions anew.
     """
 
     name: str
@@ -35,6 +38,7 @@ class PaperFigure:
     measure: Callable[[Any], Measures] = lambda data: {}
     draw: Callable[[Any], Any] | None = None
     table: Callable[[Any], str] | None = None
+    page: Callable[[Any], LivingPage] | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
     quick: Mapping[str, Any] = field(default_factory=dict)  # parameters of a draft; none where the part is quick anyway
     effort: str = "standard"
@@ -57,7 +61,9 @@ class PaperFigure:
 
     def files(self) -> list[str]:
         """The names of its outputs."""
-        kinds = [".nc"] + ([".png", ".pdf"] if self.draw else []) + ([".md"] if self.table else [])
+        kinds = (
+            [".nc"] + ([".png", ".pdf"] if self.draw else []) + ([".md"] if self.table else []) + ([".html"] if self.page else [])
+        )
         return [self.name + kind for kind in kinds]
 
 

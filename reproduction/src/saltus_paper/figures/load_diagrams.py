@@ -26,7 +26,7 @@ from saltus_paper.figure_data import joined, largest_angle, scalar_dataset, with
 from saltus_paper.figures.figure import PaperFigure, paper_figure
 from saltus_paper.figures.harmonic_loads import AMPLITUDE, under_force
 from saltus_paper.figures.knots_and_jumps import birth
-from saltus_paper.figures.response_panels import diagram
+from saltus_paper.figures.response_panels import diagram, diagrams_page
 from saltus_paper.figures.zooms import draw_beside
 from saltus_paper.measures import response_measures
 from saltus_paper.measures.validity_measures import validity
@@ -63,6 +63,7 @@ def force_figure(
         join=partial(joined, what="bifurcation diagram under load (i)"),
         draw=partial(_draw, frequencies=frequencies, zoomed=zoomed),
         measure=measure,
+        page=partial(diagrams_page, name=f"Fig. {name[3:]}"),
         quick={"effort": "quick"},
         module=module,
     )

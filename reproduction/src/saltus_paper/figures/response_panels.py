@@ -7,8 +7,9 @@ from typing import Any
 
 from saltus import System, bifurcation_diagram, response_spectrum
 from saltus.theory import critical_horizontal, equivalent_angle, static_angle
-from saltus_paper.figure_data import with_groups
+from saltus_paper.figure_data import named, with_groups
 from saltus_paper.figures.closed_layer import closed_layer
+from saltus_paper.figures.figure import LivingPage
 from saltus_paper.figures.harmonic_loads import AMPLITUDE, BETA0, FREQUENCY, GROUND_AMPLITUDE, VERTICAL
 from saltus_paper.figures.knots_and_jumps import jumps, knots
 
@@ -25,6 +26,13 @@ def spectrum(system: System, bounds: tuple[float, float], **options: Any) -> Any
 def diagram(system: System, bounds: tuple[float, float], swing: float = 0.0, **options: Any) -> Any:
     """The bifurcation diagram of a system over the amplitude of the horizontal load, in radians; `swing` is Vhat."""
     return _panel(bifurcation_diagram(system, AMPLITUDE, bounds, **({"window": WINDOW} | options)), scale=1.0, swing=swing)
+
+
+def diagrams_page(data: Any, name: str, first: str = "a") -> LivingPage:
+    """What a page needs for the spectra or diagrams of a figure: all of them, `first` in front, and a motion of its system."""
+    panels = sorted(data.children, key=lambda panel: (panel != first, panel))
+    diagrams = [named(data[panel], f"{name}{panel}") for panel in panels]
+    return System.from_json(diagrams[0].attrs["system"]), diagrams, {"theta": 0.3, "periods": 40}
 
 
 def static_scale(system: System) -> float:
