@@ -8,9 +8,8 @@ import pytest
 
 import saltus
 from saltus import checks
-from saltus.checks import check_memory, check_work, free_memory
+from saltus.checks import answered, check_memory, check_work, checked_by, free_memory
 from saltus.errors import ParameterError, near
-from saltus.public_functions import answered, checked_by
 
 
 @checked_by(lambda **arguments: None)

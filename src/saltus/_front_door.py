@@ -57,7 +57,7 @@ def _answering(found: Any) -> Any:
     own = vars(found).get("__init__") if hasattr(found, "__dataclass_fields__") else found
     if not isinstance(own, FunctionType) or hasattr(own, "answers"):
         return found
-    from saltus.public_functions import answered
+    from saltus.checks import answered
 
     answering: Any = answered(own)
     if own is not found:

@@ -6,15 +6,50 @@ arguments have been checked and computing begins.
 
 from __future__ import annotations
 
+import html
+import io
 import sys
 from collections.abc import Callable
+from typing import Any
 
 from saltus.checks import check_number
-from saltus.notebook import LineBelowCell
 
 Progress = Callable[[float, str], object]
-LINE = LineBelowCell()
 LOOK_INTERVAL = 0.1  # seconds between looks at Ctrl-C, and at the progress of other threads
+
+
+class LineBelowCell:
+    """One line below the cell of a notebook, which is written over as work goes on, as also in a notebook that is executed."""
+
+    def __init__(self) -> None:
+        self._handle: Any = None
+
+    def show(self, fraction: float, what: str) -> bool:
+        """Show the line; False outside of a notebook."""
+        shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+        if not hasattr(shell, "kernel"):
+            return False
+        notebook, done = sys.modules["IPython"].display, fraction >= 1.0
+        line = f"<progress value='{fraction:.4f}' max='1'></progress> {100 * fraction:3.0f} % {html.escape(what)}"
+        if self._handle is None:
+            self._handle = notebook.display(notebook.HTML(line), display_id=True)
+        else:
+            self._handle.update(notebook.HTML(line))
+        if done:
+            self._handle = None
+        return True
+
+
+def show_below_cell(figure: Any) -> None:
+    """In a notebook, show a figure below the cell that makes it; elsewhere do nothing."""
+    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+    if hasattr(shell, "kernel"):
+        picture, notebook = io.BytesIO(), sys.modules["IPython"].display
+        figure.savefig(picture, format="png", dpi=110)
+        notebook.display(notebook.Image(picture.getvalue()))
+
+
+LINE = LineBelowCell()
 
 
 def silent(fraction: float, what: str) -> None:

@@ -1,9 +1,11 @@
-"""The base class of all results: a dataset, from which pictures, files and tables are made, and their facts in a notebook."""
+"""The base class of all results: a dataset, from which pictures, files and tables are made, whose attributes say where it comes
+from, and the facts of which a notebook shows."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+import json
+from collections.abc import Iterator, Mapping
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,8 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.errors import ParameterError, near, shown
-from saltus.notebook import html_table, rows_table
-from saltus.provenance import provenance
+from saltus.files import parsed_json
 
 if TYPE_CHECKING:
     import pandas
@@ -240,3 +241,97 @@ def _is_short(value: Any) -> bool:
     if isinstance(value, np.ndarray):
         return 0 < value.size <= MOST_ENTRIES
     return value is None or isinstance(value, (int, float, str, Enum))
+
+
+# Raised whenever the same request gives other numbers than before: results of another version are refused and not continued.
+RESULT_VERSION = 14
+
+
+def provenance(system: System | None = None, *, tol: float | None = None, seed: int | None = None, **more: Any) -> dict[str, Any]:
+    """The attributes `saltus_version`, `result_version`, `system` and `equations` (as JSON), `tol` and `seed`, as far as they are
+    given, and further ones.
+
+    The system's JSON has its numbers, and `equations` a digest of each part of its equations (`saltus.taylor.equations_of`).
+    """
+    from saltus import __version__
+
+    kept: dict[str, Any] = {"saltus_version": __version__, "result_version": RESULT_VERSION}
+    if system is not None:
+        kept |= {"system": system.to_json()} | identity(system)
+    return kept | {name: value for name, value in (("tol", tol), ("seed", seed)) if value is not None} | more
+
+
+def identity(system: System) -> dict[str, Any]:
+    """The attributes that `check_provenance` compares, `result_version` and `equations`, for parts that are computed elsewhere.
+
+    Raises
+    ------
+    TraceError
+        A model that cannot be traced.
+    """
+    from saltus.taylor import equations_of
+
+    return {"result_version": RESULT_VERSION, "equations": json.dumps(equations_of(system))}
+
+
+def check_provenance(attributes: Mapping[str, Any], system: System, what: str, remedy: str = "compute it again") -> None:
+    """Refuse a result, `what`, whose attributes are not those of this system and of this version of saltus.
+
+    Raises
+    ------
+    ParameterError
+        The error names the version or the part of the equations that differs, and the `remedy`.
+    """
+    differ = "; ".join(_differences(attributes, system))
+    if differ:
+        raise ParameterError(f"{what} is not of what is computed now: {differ}; {remedy}")
+
+
+def _differences(attributes: Mapping[str, Any], system: System) -> Iterator[str]:
+    version, name = attributes.get("result_version"), type(system.model).__name__
+    if version != RESULT_VERSION:
+        by = f"saltus {attributes['saltus_version']}" if "saltus_version" in attributes else "another saltus"
+        yield f"it is by {by}, whose results are of version {version if version is not None else 1}, and here of {RESULT_VERSION}"
+        return
+    try:
+        there = dict(parsed_json(attributes["equations"]))
+    except (KeyError, TypeError, ValueError):
+        yield f"it does not say of which equations of {name} it is"
+        return
+    here = json.loads(identity(system)["equations"])
+    changed = [part for part in here if here[part] != there.get(part)]
+    if changed:
+        yield f"the {' and the '.join(changed)} of {name} {'has' if len(changed) == 1 else 'have'} changed since"
+
+
+MOST_ROWS = 40  # the most rows of a table; further ones are only counted
+CELL = "style='text-align:left;padding:1px 10px 1px 0;vertical-align:top'"
+
+
+def html_table(title: str, facts: Mapping[str, Any]) -> str:
+    """A table with a row for each fact; floats with 9 digits."""
+    rows = [f"<tr><th {CELL}>{_text(name)}</th><td {CELL}>{_text(value)}</td></tr>" for name, value in facts.items()]
+    more = f"<tr><td {CELL} colspan='2'>and {len(rows) - MOST_ROWS} more</td></tr>" if len(rows) > MOST_ROWS else ""
+    return f"<div><strong>{_text(title)}</strong><table>{''.join(rows[:MOST_ROWS])}{more}</table></div>"
+
+
+def rows_table(columns: Mapping[str, Any]) -> str:
+    """A table with a column for each name, and a heading."""
+    count = max((len(values) for values in columns.values()), default=0)
+    head = "".join(f"<th {CELL}>{_text(name)}</th>" for name in columns)
+    rows = [
+        "<tr>" + "".join(f"<td {CELL}>{_text(_plain(values[i]))}</td>" for values in columns.values()) + "</tr>"
+        for i in range(min(count, MOST_ROWS))
+    ]
+    more = f"<tr><td {CELL} colspan='{len(columns)}'>and {count - MOST_ROWS} more</td></tr>" if count > MOST_ROWS else ""
+    return f"<div><table><tr>{head}</tr>{''.join(rows)}{more}</table></div>"
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if hasattr(value, "item") else value
+
+
+def _text(value: Any) -> str:
+    import html
+
+    return html.escape(f"{value:.9g}" if isinstance(value, float) else str(value))

@@ -21,7 +21,7 @@ from saltus.cli.app import app
 from saltus.errors import ParameterError, SweepError
 from saltus.files import checked_content, write_dataset
 from saltus.flow import Ending
-from saltus.provenance import identity
+from saltus.result import identity
 from saltus.studies import response_spectrum
 from saltus.studies.diagram import diagram_work
 from saltus.studies.diagram.effort import EFFORTS, Effort

@@ -14,8 +14,7 @@ from saltus.attractors.stroboscopic_section import is_constant
 from saltus.checks import check_count
 from saltus.flow import Ending, extrema_names, state_names
 from saltus.orbits import PeriodicOrbit
-from saltus.provenance import provenance
-from saltus.result import Result
+from saltus.result import Result, provenance
 from saltus.systems import System, Window
 
 if TYPE_CHECKING:

@@ -12,12 +12,11 @@ import numpy as np
 from saltus.attractors.attractor import LAST_STATES, REST, SAME_STATE, UNDECIDED, Attractor, Attractors, Target
 from saltus.attractors.classification import classify
 from saltus.attractors.stroboscopic_section import section_states, solved_orbit, stays_at_rest, with_clock
-from saltus.checks import check_count, check_number, check_starts, check_states
+from saltus.checks import check_count, check_number, check_starts, check_states, checked_by
 from saltus.errors import ParameterError
 from saltus.flow import RECURRENCE, Ending, Recurrence, extrema_names, find_recurrence, motions_from, stroboscopic
 from saltus.orbits import Branch, PeriodicOrbit, is_symmetric
 from saltus.progress import Progress, part_of, silent
-from saltus.public_functions import checked_by
 from saltus.systems import (
     Box,
     System,

@@ -9,11 +9,10 @@ import numpy as np
 
 from saltus.attractors.stroboscopic_section import certify, check_periodic
 from saltus.bounds import area_contraction, enclose, leaves_over_a_period, on_side
-from saltus.checks import check_count, check_size
+from saltus.checks import Numbers, check_count, check_size
 from saltus.errors import ParameterError
 from saltus.flow import ContactRegularity, contact_regularity, find_recurrence
 from saltus.orbits import PeriodicOrbit
-from saltus.public_functions import Numbers
 from saltus.systems import System, check_system
 from saltus.taylor import trace
 

@@ -21,11 +21,10 @@ import numpy as np
 
 from saltus.attractors.attractor import state_plane, state_units
 from saltus.attractors.stroboscopic_section import section_states
-from saltus.checks import check_count, check_number
+from saltus.checks import answered, check_count, check_number
 from saltus.errors import MotionError, ParameterError
 from saltus.flow import last_states, motions_from, sensitivities
 from saltus.orbits import PeriodicOrbit
-from saltus.public_functions import answered
 from saltus.result import Result, result_dataset
 from saltus.systems import Box, System, Window, arguments_of, check_window, reversed_system
 

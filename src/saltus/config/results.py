@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.checks import answered
 from saltus.errors import ParameterError, shown
-from saltus.public_functions import answered
 from saltus.result import Result
 from saltus.systems import System
 

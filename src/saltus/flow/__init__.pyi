@@ -19,7 +19,6 @@ from .lanes.inputs import Inputs as Inputs
 from .lanes.inputs import read_inputs as read_inputs
 from .lanes.threads import available_cores as available_cores
 from .lanes.threads import share_cores as share_cores
-from .long_time.approach import approached as approached
 from .long_time.load_release import Release as Release
 from .long_time.load_release import contact_pull as contact_pull
 from .long_time.load_release import load_releases as load_releases
@@ -27,6 +26,7 @@ from .long_time.load_release import peak_near as peak_near
 from .long_time.recurrence import RECURRENCE as RECURRENCE
 from .long_time.recurrence import Ending as Ending
 from .long_time.recurrence import Recurrence as Recurrence
+from .long_time.recurrence import approached as approached
 from .long_time.recurrence import ensemble_from as ensemble_from
 from .long_time.recurrence import find_recurrence as find_recurrence
 from .long_time.recurrence import last_states as last_states

@@ -1,4 +1,3 @@
-from .averages_over_time import transmissibility as transmissibility
 from .branches.branch import Branch as Branch
 from .branches.branch import orbits_of as orbits_of
 from .branches.branch_continuation import STEP as STEP
@@ -16,6 +15,7 @@ from .branches.symmetry import is_symmetric as is_symmetric
 from .branches.symmetry import keeps_symmetry as keeps_symmetry
 from .energy_balance import energies as energies
 from .energy_balance import mean_dissipated_power as mean_dissipated_power
+from .energy_balance import transmissibility as transmissibility
 from .equations.kinds import equations_of as equations_of
 from .finding.from_motion import find_orbit as find_orbit
 from .finding.from_motion import orbit_from as orbit_from

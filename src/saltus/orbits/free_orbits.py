@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import as_numbers, check_number
+from saltus.checks import answered, as_numbers, check_number
 from saltus.enumerations import Sentence
 from saltus.errors import MotionError, ParameterError, shown
 from saltus.flow import Ending, Motion, Stop, simulate
 from saltus.progress import Progress, silent
-from saltus.provenance import provenance
-from saltus.public_functions import answered
-from saltus.result import Result
+from saltus.result import Result, provenance
 from saltus.systems import Constant, System, check_system
 
 if TYPE_CHECKING:

@@ -6,12 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import check_count
+from saltus.checks import answered, check_count
 from saltus.flow import simulate_many
 from saltus.orbits.equations.sampled_motion import DYING
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import TOLERANCES
-from saltus.public_functions import answered
 from saltus.systems import System
 
 

@@ -7,7 +7,7 @@ from contextlib import nullcontext
 from typing import Any
 
 from saltus.errors import ParameterError, shown
-from saltus.notebook import show_below_cell
+from saltus.progress import show_below_cell
 from saltus.plots.basins import draw_attractors, draw_basins, draw_integrity, draw_uncertainty, draw_wada
 from saltus.plots.chaos import draw_chaotic_bands, draw_exponents, draw_exponents_along, draw_verdict
 from saltus.plots.chart import draw_stability_chart
@@ -19,6 +19,7 @@ from saltus.plots.overturning import draw_fragility, draw_overturning
 from saltus.plots.plane import draw_manifold, draw_plane, draw_separatrix
 from saltus.plots.response import draw_diagram
 from saltus.plots.unit_cell import draw_unit_cell
+from saltus.progress import show_below_cell
 
 DRAWINGS: dict[str, Callable[..., Any]] = {
     "attractors": draw_attractors,

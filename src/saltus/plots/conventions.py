@@ -20,9 +20,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from saltus.checks import check_number
+from saltus.checks import answered, bound_arguments, check_number
 from saltus.errors import ParameterError, SaltusError, shown
-from saltus.public_functions import answered, bound_arguments
 
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_count, check_number
+from saltus.checks import check_count, check_number, checked_by
 from saltus.errors import MotionError, ParameterError, SaltusError, near, shown
 from saltus.flow import state_names
-from saltus.notebook import html_table
 from saltus.progress import Progress, silent
-from saltus.public_functions import checked_by
-from saltus.result import Result, result_dataset
+from saltus.result import Result, html_table, result_dataset
 from saltus.studies.measured_motions import (
     START,
     Compared,

@@ -14,12 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.attractors import Equilibrium, share_interval
-from saltus.checks import check_axis
+from saltus.checks import check_axis, checked_by
 from saltus.continuation import STEPS, Corrected, Course, EquationCurve, Events, Point, both_ways
 from saltus.errors import MotionError, ParameterError, shown
 from saltus.flow import Motion, Stop, sensitivities, simulate
 from saltus.progress import Progress, part_of, silent
-from saltus.public_functions import checked_by
 from saltus.result import result_dataset
 from saltus.studies.shaken import OVERTURNING, WINDOW, Outcomes, Shaken, end_of
 from saltus.systems import Box, Record, System

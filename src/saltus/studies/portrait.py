@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.attractors import Equilibrium, Separatrix, equilibria, separatrices
-from saltus.checks import check_count, check_number, check_states
+from saltus.checks import check_count, check_number, check_states, checked_by
 from saltus.errors import ParameterError
 from saltus.flow import simulate
 from saltus.progress import Progress, silent
-from saltus.provenance import provenance
-from saltus.public_functions import checked_by
+from saltus.result import provenance
 from saltus.systems import Box, System, VelocityReduction, check_window, even_steps
 
 if TYPE_CHECKING:

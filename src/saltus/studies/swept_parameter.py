@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_axis, check_count, check_number
+from saltus.checks import check_axis, check_count, check_number, checked_by
 from saltus.errors import MotionError, ParameterError, shown
 from saltus.flow import Ending, Motion, Recurrence, captured_between, find_recurrence, rate_name, simulate
 from saltus.progress import Progress, silent
-from saltus.provenance import provenance
-from saltus.public_functions import checked_by
+from saltus.result import provenance
 from saltus.systems import System, arguments_of, check_along, check_path, check_system, read_start
 
 if TYPE_CHECKING:

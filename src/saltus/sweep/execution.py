@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_count
+from saltus.checks import answered, check_count
 from saltus.errors import ParameterError, SweepError
 from saltus.progress import Progress, silent
-from saltus.public_functions import answered
 from saltus.sweep.chunks import Arrays, Computation, Failure, Index, Raised, attempt, checked
 from saltus.sweep.plan import Plan
 from saltus.sweep.store import Store, opened

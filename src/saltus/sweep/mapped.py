@@ -14,11 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_count
+from saltus.checks import Numbers, answered, check_count
 from saltus.errors import ParameterError, shown
 from saltus.progress import Progress, silent
-from saltus.provenance import provenance
-from saltus.public_functions import Numbers, answered
+from saltus.result import provenance
 from saltus.sweep.execution import check_run, run
 from saltus.sweep.plan import Plan, Variable, axis_values
 from saltus.sweep.store_files import METADATA

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.checks import answered
 from saltus.errors import ParameterError, SweepError, shown
 from saltus.files import write_durably
-from saltus.public_functions import answered
 from saltus.sweep import store_files as files
 from saltus.sweep.chunks import Arrays, Failure, Index
 from saltus.sweep.plan import Plan, differences

@@ -12,10 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import LIMITS
+from saltus.checks import LIMITS, answered
 from saltus.errors import ParameterError
 from saltus.files import parsed_json
-from saltus.public_functions import answered
 from saltus.sweep import store_files as files
 from saltus.sweep.chunks import ChunkGrid, Failure, Index
 from saltus.sweep.store_files import memo_status

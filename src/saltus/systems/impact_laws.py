@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import check_number, settle_numbers
+from saltus.checks import answered, check_number, settle_numbers
 from saltus.errors import ParameterError
-from saltus.public_functions import answered
 from saltus.systems.contact_model import Contact, ContactModel
 from saltus.systems.gap_coordinates import in_gap_coordinates
 from saltus.systems.load import Load

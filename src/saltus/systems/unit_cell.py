@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from saltus.checks import RADIANS, check_number, settle_numbers
+from saltus.checks import RADIANS, Numbers, check_number, settle_numbers
 from saltus.errors import ParameterError, shown
-from saltus.public_functions import Numbers
 from saltus.systems.metainterface import Metainterface
 from saltus.systems.si_units import PhysicalCell
 from saltus.systems.two_layer import TwoLayer

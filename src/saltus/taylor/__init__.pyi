@@ -2,8 +2,6 @@ from .cache import cache_directory as cache_directory
 from .cache import digest as digest
 from .cache import kept_bytes as kept_bytes
 from .cache import source_of as source_of
-from .equations import equations_of as equations_of
-from .equations import structure_key as structure_key
 from .exact_algebra import Form as Form
 from .exact_algebra import NoNormalForm as NoNormalForm
 from .exact_algebra import constant as constant
@@ -12,8 +10,10 @@ from .exact_algebra import normal_form as normal_form
 from .generated import Case as Case
 from .generated import SeriesOf as SeriesOf
 from .generated import WrittenFunction as WrittenFunction
+from .generated import equations_of as equations_of
 from .generated import llvm_text as llvm_text
 from .generated import load_functions as load_functions
+from .generated import structure_key as structure_key
 from .graph import RECORD_WIDTH as RECORD_WIDTH
 from .graph import Expr as Expr
 from .graph import combine as combine

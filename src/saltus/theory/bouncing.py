@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import check_number
+from saltus.checks import Numbers, check_number
 from saltus.errors import ParameterError
-from saltus.public_functions import Numbers
 from saltus.systems import System
 from saltus.theory.arguments import check_shapes, numbers
 from saltus.theory.layer import Layer, layers

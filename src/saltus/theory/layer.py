@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from saltus.checks import Numbers
 from saltus.errors import ParameterError
-from saltus.public_functions import Numbers
 from saltus.systems import Constant, Metainterface, System
 from saltus.theory.arguments import check_side
 

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_number
+from saltus.checks import Numbers, check_number
 from saltus.errors import ParameterError
-from saltus.public_functions import Numbers
 from saltus.result import Result
 from saltus.systems import Harmonic, Load, Metainterface, System
 from saltus.theory.layer import open_layer

@@ -6,9 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from saltus.checks import check_number
+from saltus.checks import Numbers, check_number
 from saltus.errors import ParameterError
-from saltus.public_functions import Numbers
 from saltus.systems import EnergyRestitution, System
 from saltus.theory.arguments import check_shapes, check_side, numbers
 from saltus.theory.layer import metainterface

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import check_number
+from saltus.checks import Numbers, check_number
 from saltus.errors import ParameterError
-from saltus.public_functions import Numbers
 from saltus.theory.arguments import check_shapes, numbers
 
 

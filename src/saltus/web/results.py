@@ -17,7 +17,7 @@ from saltus.branch_tables import branches_of
 from saltus.errors import ParameterError
 from saltus.files import parsed_json
 from saltus.orbits import orbits_of
-from saltus.provenance import check_provenance, identity
+from saltus.result import check_provenance, identity
 from saltus.systems import System, numbers
 
 MEANINGS = {

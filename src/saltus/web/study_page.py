@@ -10,11 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import check_number
+from saltus.checks import Numbers, check_number
 from saltus.errors import ParameterError, SaltusError
 from saltus.files import check_writable, write_text
 from saltus.orbits import Branch, OrbitEnd
-from saltus.public_functions import Numbers
 from saltus.systems import System, arguments_of, check_system, numbers, on_this_side, read_start, rest_state, state_of
 from saltus.web.accepted import accepted
 from saltus.web.description import page_parts

@@ -15,7 +15,7 @@ from saltus.attractors.stroboscopic_section import with_clock
 from saltus.errors import ParameterError
 from saltus.flow import Ending, Recurrence, find_recurrence
 from saltus.progress import Progress, silent
-from saltus.provenance import check_provenance, identity, provenance
+from saltus.result import check_provenance, identity, provenance
 from saltus.systems import System, before_impacts
 
 if TYPE_CHECKING:

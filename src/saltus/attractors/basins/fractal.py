@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.attractors.attractor import UNDECIDED
-from saltus.checks import check_count, check_size
+from saltus.checks import Numbers, answered, check_count, check_size
 from saltus.errors import ParameterError
-from saltus.public_functions import Numbers, answered
 from saltus.result import Result, result_dataset
 
 if TYPE_CHECKING:

@@ -32,12 +32,11 @@ from saltus.attractors.basins.basin_cells import Grid, Labelling, check_basin_st
 from saltus.attractors.phase_plane import separatrices
 from saltus.attractors.saddle_manifolds import is_saddle, stable_manifold
 from saltus.attractors.stroboscopic_section import is_constant, section_states, solved_orbit, with_clock
-from saltus.checks import LIMITS, check_axis, check_count, check_memory, check_number, check_work
+from saltus.checks import LIMITS, check_axis, check_count, check_memory, check_number, check_work, checked_by
 from saltus.errors import ParameterError
 from saltus.flow import state_names
 from saltus.orbits import PeriodicOrbit, is_symmetric, same_orbit
 from saltus.progress import Progress, part_of, silent
-from saltus.public_functions import checked_by
 from saltus.systems import System, Window, check_reached, check_system, check_window, image_of, rest_state, reversed_system
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.checks import Numbers, answered
 from saltus.errors import ParameterError
-from saltus.public_functions import Numbers, answered
 from saltus.result import result_dataset
 
 if TYPE_CHECKING:

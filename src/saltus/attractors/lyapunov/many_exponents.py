@@ -12,6 +12,7 @@ import numpy as np
 
 from saltus.attractors.lyapunov.growth import LYAPUNOV, Estimate, check_run, first_frame, resolution, span_count
 from saltus.attractors.lyapunov.spectrum import impact_factor
+from saltus.checks import Numbers
 from saltus.enumerations import flags
 from saltus.errors import ParameterError
 from saltus.flow import (
@@ -27,8 +28,7 @@ from saltus.flow import (
     stop_names,
 )
 from saltus.progress import LOOK_INTERVAL, Progress, part_of, silent
-from saltus.provenance import provenance
-from saltus.public_functions import Numbers
+from saltus.result import provenance
 from saltus.systems import System
 
 if TYPE_CHECKING:

@@ -21,9 +21,9 @@ from saltus.attractors.lyapunov.growth import (
     uncertainty,
 )
 from saltus.bounds import Interval, Leaves, enclose, reads
+from saltus.checks import Numbers
 from saltus.flow import EventKind, Motion, Stop, sensitivities, simulate
 from saltus.progress import Progress, part_of, silent
-from saltus.public_functions import Numbers
 from saltus.result import Result, result_dataset
 from saltus.systems import System, arguments_of, states_beside
 from saltus.taylor import Expr, differentiate, substitute, trace

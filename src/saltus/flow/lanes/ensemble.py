@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from saltus.checks import check_memory, check_number, check_work
+from saltus.checks import Numbers, check_memory, check_number, check_work
 from saltus.errors import ParameterError
 from saltus.flow.kernel.compiled import Program, limits_of, program
 from saltus.flow.kernel.layout import Mode, Status
@@ -23,7 +23,6 @@ from saltus.flow.lanes.options import EnsembleOptions, Sample, Until, read_last,
 from saltus.flow.lanes.threads import Jobs, Lanes
 from saltus.flow.motion.simulate import Clock, clock
 from saltus.progress import Progress, silent
-from saltus.public_functions import Numbers
 from saltus.systems import System, check_system, numbers
 from saltus.taylor import record_tables
 

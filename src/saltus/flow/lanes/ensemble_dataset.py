@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_dataset
+from saltus.checks import answered, check_dataset
 from saltus.flow.kernel.layout import LOSSLESS, Status
 from saltus.flow.lanes.options import Sample, Until
 from saltus.flow.motion.events import Stop
 from saltus.flow.motion.motion import rate_name, state_names
-from saltus.provenance import provenance
-from saltus.public_functions import answered
+from saltus.result import provenance
 from saltus.systems import energy_gains
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.public_functions import answered
+from saltus.checks import answered
 from saltus.systems import ContactModel, Load, System, check_system
 
 RELEASE_SAMPLES = 64  # per forcing period and order of the highest harmonic: the contact acceleration has no narrower peak

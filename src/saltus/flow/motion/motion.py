@@ -8,14 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_count, instants
+from saltus.checks import Numbers, check_count, instants
 from saltus.errors import ParameterError, near
 from saltus.flow.motion.events import EventKind, Impacts, MotionEvents, Stop, modes_of
 from saltus.flow.motion.validity import DenseOutput, Validity, ValidityCheck
-from saltus.notebook import html_table
-from saltus.provenance import provenance
-from saltus.public_functions import Numbers
-from saltus.result import Result, table_of
+from saltus.result import Result, html_table, provenance, table_of
 from saltus.systems import System
 
 if TYPE_CHECKING:

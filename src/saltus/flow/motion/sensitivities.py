@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_names, instants
+from saltus.checks import Numbers, check_names, instants
 from saltus.flow.contacts.layout import ImpactDetail
 from saltus.flow.kernel.compiled import Program
 from saltus.flow.kernel.layout import GrazingDetail, RestDetail
@@ -18,7 +18,6 @@ from saltus.flow.motion.motion import Motion, in_own_coordinates, state_names
 from saltus.flow.motion.simulate import Followed, MotionRequest, follow
 from saltus.flow.motion.validity import DenseOutput
 from saltus.progress import Progress, silent
-from saltus.public_functions import Numbers
 from saltus.result import Result, result_dataset
 from saltus.systems import System, check_system, constrained_acceleration, substitute
 from saltus.taylor import FREQUENCY

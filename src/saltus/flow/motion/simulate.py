@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import LIMITS, check_memory, check_number, check_size, notice_degrees
+from saltus.checks import LIMITS, Numbers, check_memory, check_number, check_size, notice_degrees
 from saltus.errors import MotionError, ParameterError
 from saltus.flow.kernel.compiled import Program, limits_of, program
 from saltus.flow.kernel.layout import Mode, Status
@@ -18,7 +18,6 @@ from saltus.flow.motion.kernel_state import MOST, ContactState, KernelState, Rec
 from saltus.flow.motion.motion import Motion, in_own_coordinates
 from saltus.flow.motion.validity import DenseOutput
 from saltus.progress import Progress, silent
-from saltus.public_functions import Numbers
 from saltus.systems import System, check_system, read_start
 
 # The arguments of `simulate` and `sensitivities`: a misspelt one arrives among the coordinates.

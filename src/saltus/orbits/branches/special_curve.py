@@ -15,8 +15,7 @@ from saltus.orbits.branches.orbit_curve import OrbitCurve, OrbitPoint
 from saltus.orbits.branches.special_point import SpecialPoint
 from saltus.orbits.equations.contract import OrbitEvaluation, Solution
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.provenance import provenance
-from saltus.result import Result
+from saltus.result import Result, provenance
 
 if TYPE_CHECKING:
     import xarray

@@ -10,12 +10,12 @@ import cmath
 
 import numpy as np
 
+from saltus.checks import answered
 from saltus.continuation import Corrected, between
 from saltus.errors import ParameterError
 from saltus.orbits.branches.orbit_curve import OrbitPoint
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import TOLERANCES
-from saltus.public_functions import answered
 from saltus.systems import Constant, Harmonic, Load, Signal, System, check_system
 
 

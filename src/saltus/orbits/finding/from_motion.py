@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import check_count, check_names
+from saltus.checks import Numbers, check_count, check_names
 from saltus.errors import MotionError
 from saltus.flow import (
     RECURRENCE,
@@ -27,7 +27,6 @@ from saltus.orbits.equations.kinds import KINDS, equations_of
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
 from saltus.orbits.verify import same_orbit
-from saltus.public_functions import Numbers
 from saltus.systems import (
     System,
     arguments_of,

@@ -17,7 +17,7 @@ import numpy as np
 from saltus.errors import MotionError, ParameterError
 from saltus.orbits import Branch, SpecialPoint, continue_special, find_orbit, follow_stable
 from saltus.progress import Progress
-from saltus.provenance import check_provenance, identity
+from saltus.result import check_provenance, identity
 from saltus.studies.chart.changes import Changes, ChartMotions, Ways, ending_type, trace
 from saltus.studies.chart.motions import ALIKE
 from saltus.systems import System, arguments_of

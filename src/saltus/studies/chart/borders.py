@@ -15,10 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_count
+from saltus.checks import answered, check_count
 from saltus.enumerations import flags
 from saltus.progress import Progress, part_of, silent
-from saltus.public_functions import answered
 from saltus.studies.chart.border_work import BorderComputations, explained, passes_through
 from saltus.studies.chart.cells import beyond_limits, spread
 from saltus.studies.chart.changes import (

@@ -13,7 +13,7 @@ from saltus.checks import check_axis, check_count, check_dataset, check_memory, 
 from saltus.enumerations import flags
 from saltus.errors import ParameterError, shown
 from saltus.flow import RECURRENCE, Ending, state_names
-from saltus.provenance import check_provenance, identity, provenance
+from saltus.result import check_provenance, identity, provenance
 from saltus.studies.chart.motions import KEPT, CellOutcome
 from saltus.systems import System, check_along, check_path, check_system, check_window
 from saltus.theory import amplitude_limits

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.attractors import share_interval
-from saltus.checks import check_count, check_dataset
+from saltus.checks import answered, check_count, check_dataset, checked_by
 from saltus.progress import Progress, part_of, silent
-from saltus.public_functions import answered, checked_by
 from saltus.studies.chart.border_work import explained, special_point, unseen_folds
 from saltus.studies.chart.borders import Borders, with_borders
 from saltus.studies.chart.cells import computed

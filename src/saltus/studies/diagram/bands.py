@@ -12,8 +12,7 @@ import numpy as np
 from saltus.enumerations import flags
 from saltus.flow import Ending, Motion, find_recurrence
 from saltus.orbits import Branch, PeriodicOrbit, SpecialKind, SpecialPoint, is_symmetric
-from saltus.provenance import provenance
-from saltus.result import Result
+from saltus.result import Result, provenance
 from saltus.studies.diagram.simulated import SimulatedMotions
 from saltus.systems import System, image_of
 

@@ -10,10 +10,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from saltus.attractors import EarlierJudgement
-from saltus.checks import check_count
+from saltus.checks import check_count, checked_by
 from saltus.flow import Ending
 from saltus.progress import Progress, part_of, silent
-from saltus.public_functions import checked_by
 from saltus.studies.diagram.bands import BandOrigin, Bands
 from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.effort import EFFORTS, check_diagram, read_effort

@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.branch_tables import branch_tables
-from saltus.checks import as_numbers, check_bounds, check_count, check_step
+from saltus.checks import as_numbers, check_bounds, check_count, check_step, checked_by
 from saltus.errors import ParameterError, shown
 from saltus.flow import state_names
 from saltus.orbits import STEP, Branch, PeriodicOrbit, closing_rows
 from saltus.progress import Progress, growing, part_of, silent
-from saltus.provenance import provenance
-from saltus.public_functions import checked_by
+from saltus.result import provenance
 from saltus.studies.diagram.bands import band_dataset, explained
 from saltus.studies.diagram.branch_set import BranchSet
 from saltus.studies.diagram.diagram_search import DiagramSearch

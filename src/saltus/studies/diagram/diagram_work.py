@@ -31,7 +31,7 @@ from saltus.orbits import (
     switch_branch,
 )
 from saltus.progress import LOOK_INTERVAL, Progress, silent
-from saltus.provenance import check_provenance, identity, provenance
+from saltus.result import check_provenance, identity, provenance
 from saltus.studies.diagram.simulated import SimulatedMotions, followed, simulate_from
 from saltus.systems import System
 
