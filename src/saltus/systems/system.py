@@ -11,7 +11,7 @@ import numpy as np
 
 from saltus.errors import ParameterError, near, shown
 from saltus.files import parsed_json
-from saltus.result import html_table
+from saltus.notebook import html_table
 from saltus.systems.contact_model import ContactModel, normal_forces
 from saltus.systems.gap_coordinates import in_gap_coordinates
 from saltus.systems.impact_laws import ImpactLaw, VelocityReduction

@@ -12,7 +12,8 @@ from saltus.checks import Numbers, check_count, instants
 from saltus.errors import ParameterError, near
 from saltus.flow.motion.events import EventKind, Impacts, MotionEvents, Stop, modes_of
 from saltus.flow.motion.validity import DenseOutput, Validity, ValidityCheck
-from saltus.result import Result, html_table, provenance, table_of
+from saltus.notebook import html_table
+from saltus.result import Result, provenance, table_of
 from saltus.systems import System
 
 if TYPE_CHECKING:
