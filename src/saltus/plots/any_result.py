@@ -7,7 +7,6 @@ from contextlib import nullcontext
 from typing import Any
 
 from saltus.errors import ParameterError, shown
-from saltus.progress import show_below_cell
 from saltus.plots.basins import draw_attractors, draw_basins, draw_integrity, draw_uncertainty, draw_wada
 from saltus.plots.chaos import draw_chaotic_bands, draw_exponents, draw_exponents_along, draw_verdict
 from saltus.plots.chart import draw_stability_chart
