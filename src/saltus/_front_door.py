@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable
+from importlib import import_module
 from types import FunctionType, ModuleType
 from typing import Any
 
@@ -43,7 +44,13 @@ def front_door(package: str, file: str) -> tuple[Callable[[str], Any], Callable[
 
 
 class Room(ModuleType):
-    """A package of saltus; if it is called by mistake, the error names the functions that may be meant."""
+    """A package of saltus; if it is called by mistake, the error names the functions that may be meant.
+
+    It is pickled by its name, as cloudpickle sends the modules that functions of notebooks use.
+    """
+
+    def __reduce__(self) -> tuple[Callable[[str], ModuleType], tuple[str]]:
+        return import_module, (self.__name__,)
 
     def __call__(self, *given: Any, **named: Any) -> Any:
         own = self.__name__.rpartition(".")[2]

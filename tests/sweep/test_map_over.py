@@ -38,8 +38,8 @@ def test_processes_find_a_function_wherever_it_stands(where, tmp_path):
     factor = 2.0
     function = total if where == "a module" else (lambda x, y: factor * total(x, y))
     if where == "a notebook":  # it is in no file, and its module is __main__ in every process
-        cell: dict = {"__name__": "__main__"}
-        exec("def function(x, y):\n    return 2.0 * (x + y)\n", cell)
+        cell: dict = {"__name__": "__main__", "saltus": saltus, "fall": saltus.Load(force=2.0)}
+        exec("def function(x, y):\n    return fall.force(0.0) * (x + y) if saltus.Load else 0.0\n", cell)
         function = cell["function"]
     data = saltus.map_over(function, GRID, store=tmp_path / "kept.zarr", workers=2)
     np.testing.assert_array_equal(data.value, (1.0 if where == "a module" else 2.0) * np.add.outer(GRID["x"], GRID["y"]))
