@@ -194,3 +194,20 @@ x = 0.1
 def test_a_sweep_without_meaning_is_refused(change, sentence):
     with pytest.raises(ParameterError, match=sentence):
         saltus.frequency_sweep(oscillator(), **({"values": [1.0, 1.1], "x": 0.0} | change))
+
+
+def test_between_stops_what_was_asked_for_is_drawn():
+    """The amplitude is that of the stops for all values; the impacts in a period and functions can be drawn too."""
+    stops = saltus.System(
+        model=saltus.TwoStops(damping=0.05),
+        load=saltus.Load(frequency=1.0, force=saltus.Harmonic(0.4)),
+        impact=saltus.NewtonImpact(0.6),
+    )
+    data = saltus.frequency_sweep(stops, [0.9, 1.0, 1.1], x=0.0, functions={"speed": lambda motion: abs(motion.velocity)})
+    assert np.ptp(data.amplitude.values) < 1e-9
+    for quantity, name, label in ((None, "speed", "speed"), ("impact_count", "impact_count", "impact")):
+        ax = draw_sweep(data, quantity)
+        np.testing.assert_allclose(ax.lines[0].get_ydata(), data[name].sel(direction="up").values)
+        assert label in ax.get_ylabel()
+    with pytest.raises(ParameterError, match="quantity must be one of amplitude"):
+        draw_sweep(data, "speeds")

@@ -13,12 +13,13 @@ from matplotlib.colors import ListedColormap, PowerNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, shown
 from saltus.plots.conventions import (
     LOOK,
     axes_or_new,
     cell_edges,
     drawing,
+    is_flat,
     new_figure,
     parameter_name,
     parameter_symbol,
@@ -280,20 +281,30 @@ BAND = "#ececec"  # where up and down differ
 
 
 @drawing
-def draw_sweep(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * LOOK.single_column) -> Axes:
-    """Draw the dataset of `frequency_sweep`: amplitudes up and down, jumps as arrows, hysteresis in grey; returns the axes."""
+def draw_sweep(
+    dataset: Any, quantity: str | None = None, *, ax: Axes | None = None, width: float = 1.3 * LOOK.single_column
+) -> Axes:
+    """Draw the dataset of `frequency_sweep`: amplitudes up and down, jumps as arrows, hysteresis in grey; returns the axes.
+
+    The `quantity` is any of its numbers over both directions, such as "impact_count" or one of its `functions`; by default the
+    amplitude or, where most motions have the same, as between two stops, the first of the functions.
+    """
+    known = [str(name) for name, part in dataset.items() if part.dims == ("direction", "value") and part.dtype.kind == "f"]
+    if quantity is not None and quantity not in known:
+        raise ParameterError(f"quantity must be one of {', '.join(known)}, got {shown(quantity)}", "quantity")
+    if quantity is None:
+        own = [name for name in known if dataset[name].attrs.get("long_name") == name]  # as functions have
+        quantity = own[0] if own and is_flat(dataset["amplitude"].values.ravel()) else "amplitude"
     ax = axes_or_new(ax, width, 0.62 * width)
     values = dataset["value"].values
     edges = cell_edges(values)
     for i in np.flatnonzero(dataset["hysteresis"].values):
         ax.axvspan(edges[i], edges[i + 1], color=BAND, linewidth=0.0, zorder=0)
     for way, line in WAYS.items():
-        found = _jumps(dataset, way)
+        found = _jumps(dataset, way, quantity)
         middle = found[:, :2].mean(axis=1)
         x = np.concatenate([values, found[:, 0], middle, found[:, 1]])  # interrupted at a jump, as no motions lie in between
-        y = np.concatenate(
-            [dataset["amplitude"].sel(direction=way).values, found[:, 2], np.full(len(found), np.nan), found[:, 3]]
-        )
+        y = np.concatenate([dataset[quantity].sel(direction=way).values, found[:, 2], np.full(len(found), np.nan), found[:, 3]])
         order = np.argsort(x, kind="stable")
         ax.plot(x[order], y[order], label=way, zorder=2, **line)
         for place, low, high in zip(middle, found[:, 2], found[:, 3], strict=True):
@@ -308,15 +319,22 @@ def draw_sweep(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * LOO
             ax.annotate("", (place, high), (place, low), arrowprops=arrow, zorder=3)
     name = symbol(dataset.attrs["coordinate"])
     ax.set_xlim(values[0], values[-1])
-    ax.set_ylim(bottom=0.0)
+    ax.set_ylim(bottom=0.0 if quantity == "amplitude" else None)
     ax.set_xlabel(parameter_name(dataset.attrs["path"]))
-    ax.set_ylabel(rf"$\max_\tau|{name}|${unit_in_brackets(dataset['amplitude'])}")
+    ax.set_ylabel(
+        rf"$\max_\tau|{name}|${unit_in_brackets(dataset['amplitude'])}"
+        if quantity == "amplitude"
+        else dataset[quantity].attrs["long_name"]
+    )
     ax.legend(loc="best")
     return ax
 
 
-def _jumps(dataset: Any, way: str) -> np.ndarray:
-    """The values before and after each jump of one direction, and the amplitudes there, (n, 4)."""
+def _jumps(dataset: Any, way: str, quantity: str) -> np.ndarray:
+    """The values before and after each jump of one direction, and the amplitudes there, (n, 4); they are known of no other
+    quantity."""
+    if quantity != "amplitude":
+        return np.empty((0, 4))
     chosen = dataset["jump_direction"].values == way
     names = ("before", "after", "amplitude_before", "amplitude_after")
     return np.stack([dataset[f"jump_{name}"].values[chosen] for name in names], axis=1)
