@@ -215,6 +215,8 @@ def good(made):
         "Chirp": (saltus.Chirp, {"amplitude": 0.1, "frequency": 1.0, "end_frequency": 2.0, "duration": 3.0}),
         "Contact": (saltus.Contact, contact),
         "EnergyRestitution": (saltus.EnergyRestitution, {"r": 0.9}),
+        "Surface": (saltus.Surface, {"name": "stop", "coordinate": "x"}),
+        "Surface.side": (saltus.Surface(name="stop", coordinate="x").side, {"position": 0.5}),
         "Friction": (saltus.Friction, {"name": "belt", "coordinate": "x", "kinetic": 0.2}),
         "HalfSine": (saltus.HalfSine, {"amplitude": 0.1, "frequency": 1.0}),
         "Harmonic": (saltus.Harmonic, {"amplitude": 0.1}),

@@ -97,6 +97,7 @@ from .systems import Ramp as Ramp
 from .systems import Record as Record
 from .systems import Ricker as Ricker
 from .systems import RockingBlock as RockingBlock
+from .systems import Surface as Surface
 from .systems import System as System
 from .systems import ThreeCells as ThreeCells
 from .systems import TwoCells as TwoCells

@@ -12,9 +12,9 @@ MOST_FILES = 10
 # A peak: the first coordinate has a maximum on a smooth arc. In each file, what is put behind which of its lines.
 PEAK = {
     "flow/kernel/layout.py": {
-        "    REVERSAL = 9\n    RESET_SLOPES = 10": "    REVERSAL = 9\n    PEAK = 10\n    RESET_SLOPES = 11"
+        "    CROSSING = 10\n    RESET_SLOPES = 11": "    CROSSING = 10\n    PEAK = 11\n    RESET_SLOPES = 12"
     },
-    "flow/motion/events.py": {'    REVERSAL = "reversal"': '    REVERSAL = "reversal"\n    PEAK = "peak"\n    # once'},
+    "flow/motion/events.py": {'    CROSSING = "crossing"': '    CROSSING = "crossing"\n    PEAK = "peak"\n    # once'},
     "flow/one_contact/kernel.py": {
         "    tau = first * h if hit >= 0 else h\n": """\
     tau = first * h if hit >= 0 else h

@@ -4,6 +4,7 @@ from .cell_chain import TwoCells as TwoCells
 from .contact_model import Contact as Contact
 from .contact_model import ContactModel as ContactModel
 from .contact_model import Friction as Friction
+from .contact_model import Surface as Surface
 from .contact_model import apart as apart
 from .contact_model import constrained_acceleration as constrained_acceleration
 from .contact_model import mass_and_force as mass_and_force

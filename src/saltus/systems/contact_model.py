@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, near
 from saltus.systems.model import Model
 
 Number = Any  # a float, or a parameter of the model while its equations are traced
@@ -117,6 +117,71 @@ class Friction:
         return self.kinetic if self.static is None else self.static
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Surface:
+    """A surface q = p of the state space that motions pass, and on whose two sides the right-hand side may differ:
+
+        M(q) q'' = r(t, q, v, s),    s = sign (q - p) / abs(q - p) = +1 or -1.
+
+    A soft stop, a backlash, a spring with two stiffnesses or a preload are such; q may be a sum of coordinates as that of a
+    `Contact`. At a crossing coordinates and velocities are continuous. The model's `force` reads s by the surface's name.
+
+    Parameters
+    ----------
+    name
+        Its name, such as "stop", in events and in the argument `sides` of `force`.
+    coordinate
+        The name of the model's coordinate, or a dictionary of the coefficients of several.
+    position
+        p, a number, which may be one of the model's parameters.
+    sign
+        +1 where s is +1 above the position, -1 where it is +1 below.
+
+    Examples
+    --------
+    >>> saltus.Surface(name="stop", coordinate="x", position=1.0).side(1.5)
+    1.0
+    """
+
+    name: str
+    coordinate: Any
+    position: Any = 0.0
+    sign: int = 1
+
+    def __post_init__(self) -> None:
+        if self.sign not in (1, -1):
+            raise ParameterError(f"the sign of the surface {self.name!r} must be +1 or -1, got {self.sign!r}", "sign")
+
+    def side(self, position: Any) -> Any:
+        """s, +1 or -1, at a position q.
+
+        Parameters
+        ----------
+        position
+            The coordinate q.
+        """
+        return self.sign * np.where(np.asarray(position) >= self.position, 1.0, -1.0)[()]
+
+
+class Sides(dict[str, Any]):
+    """The sides of a model's surfaces, +1 or -1, by their names: `sides.stop` or `sides["stop"]`."""
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in self:
+            raise ParameterError(f"no surface {name!r}; {near(name, self)}", "sides")
+        return self[name]
+
+
+class LoadOnSides:
+    """A load together with the sides on which the equations are asked for."""
+
+    def __init__(self, load: Any, sides: Sides) -> None:
+        self._load, self.sides = load, sides
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._load, name)
+
+
 MOST_CONTACTS = 12  # Which contacts are closed is found by trying, with 2^n choices at worst.
 MOST_FRICTIONS = 6  # Which frictions stick, and which way the others slide, is found by trying 3^n choices at worst.
 
@@ -134,7 +199,9 @@ class ContactModel(Model):
        a contact is closed it holds it as long as its reaction presses; impacts follow the system's law (`NewtonImpact`);
     4. `frictions`, a tuple of `Friction`, and their `normal_forces` N(t, q, v), by default 1. A friction that sticks holds the
        velocity of its coordinate. M(q) may connect no coordinate with a friction to one with a contact;
-    5. optionally `transfers` (whether an impact passes speed on to the other contacts of its group, as a crossing does) and
+    5. `surfaces`, a tuple of `Surface`. Then `force` takes a further argument, r(t, q, v, load, sides), and reads `sides.stop`,
+       +1 or -1, of the surface "stop";
+    6. optionally `transfers` (whether an impact passes speed on to the other contacts of its group, as a crossing does) and
        `singularity`, a name for where M(q) has no inverse: a motion that gets there ends with this name as `limit`.
 
     Examples
@@ -172,7 +239,7 @@ class ContactModel(Model):
             The load, whose channels are called with the time: `load.horizontal(t)`.
         """
         size = len(self.coordinates)
-        still = [0.0] * len(self.frictions)
+        still = [0.0] * len(self.frictions)  # and the surfaces on the sides of the state
         solved = constrained_acceleration(self, t, theta, velocity, load, [1.0] * size, still)
         return solved[0] if size == 1 else tuple(solved)
 
@@ -238,13 +305,15 @@ def constrained_acceleration(
 ) -> list[Any]:
     """The accelerations a of (D M D + 1 - D) a = D r, with D = diag(free): 1 where a coordinate is free, 0 where it is held.
 
-    r has the force of each friction that slides, -mu_k N s with its direction s in `slides`, 0 where it sticks.
+    r has the force of each friction that slides, -mu_k N s with its direction s in `slides`, 0 where it sticks. Behind them may
+    be +1 or -1 for each surface: whether its coordinate is above the position; else the state says so.
 
     q and v are scalars where there is one coordinate, else tuples. The matrix is eliminated from its first row on, without
     exchanging rows, as the pivots of a positive definite matrix are positive.
     """
+    load = _on_sides(model, load, slides)
     mass, force = mass_and_force(model, t, q, v, load)
-    for friction, normal, s in zip(model.frictions, normal_forces(model, t, q, v, load), slides, strict=True):
+    for friction, normal, s in zip(model.frictions, normal_forces(model, t, q, v, load), slides, strict=False):
         place = model.coordinates.index(friction.coordinate)
         force[place] = force[place] - s * friction.kinetic * normal
     size = len(force)
@@ -268,15 +337,15 @@ def constrained_acceleration(
     return solved
 
 
-def reactions(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any) -> list[Any]:
+def reactions(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any, slides: Sequence[Any] = ()) -> list[Any]:
     """The force of each contact along its sign, sign (M a - r)_i; 0 where its coordinate is free."""
-    lacking = _lacking(model, t, q, v, a, load)
+    lacking = _lacking(model, t, q, v, a, _on_sides(model, load, slides))
     return [contact.sign * lacking[model.coordinates.index(contact.coordinate)] for contact in model.contacts]
 
 
-def stick_margins(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any) -> list[Any]:
+def stick_margins(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any, slides: Sequence[Any] = ()) -> list[Any]:
     """mu_s N - l and mu_s N + l of each friction, one after the other, with the force l = (M a - r)_i that makes it stick."""
-    lacking, margins = _lacking(model, t, q, v, a, load), []
+    lacking, margins = _lacking(model, t, q, v, a, _on_sides(model, load, slides)), []
     for friction, normal in zip(model.frictions, normal_forces(model, t, q, v, load), strict=True):
         force, most = lacking[model.coordinates.index(friction.coordinate)], friction.most * normal
         margins += [most - force, most + force]
@@ -314,10 +383,28 @@ def apart(model: Model, mass: Sequence[Sequence[Any]]) -> bool:
 
 def mass_and_force(model: Any, t: Any, q: Any, v: Any, load: Any) -> tuple[list[list[Any]], list[Any]]:
     """M(q) as rows and r(t, q, v) as a list, for any number of coordinates."""
-    mass, force = model.mass_matrix(q), model.force(t, q, v, load)
+    mass, force = model.mass_matrix(q), model.force(t, q, v, load, *sides_for(model, t, q, load))
     if len(model.coordinates) == 1:
         return [[mass]], [force]
     return [list(row) for row in mass], list(force)
+
+
+def _on_sides(model: Any, load: Any, slides: Sequence[Any]) -> Any:
+    """The load together with the sides of surfaces, if these are given behind the directions of the frictions."""
+    above = slides[len(model.frictions) :]
+    if not (model.surfaces and len(above)):
+        return load
+    return LoadOnSides(load, Sides({each.name: each.sign * s for each, s in zip(model.surfaces, above, strict=True)}))
+
+
+def sides_for(model: Any, t: Any, q: Any, load: Any) -> tuple[Sides, ...]:
+    """The argument `sides` of a model's force, if it takes one: those that come with the load, else those of the coordinates."""
+    if not model.surfaces:
+        return ()
+    if isinstance(load, LoadOnSides):
+        return (load.sides,)
+    places, values = model.coordinates, q if len(model.coordinates) > 1 else (q,)
+    return (Sides({each.name: each.side(values[places.index(each.coordinate)]) for each in model.surfaces}),)
 
 
 def _held(entry: Any, i: int, j: int, free: Sequence[Any]) -> Any:

@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from saltus.errors import ParameterError
-from saltus.systems.contact_model import Contact, ContactModel, is_zero
+from saltus.systems.contact_model import Contact, ContactModel, Surface, is_zero
 
 CLOSED_BELOW = 1e-13  # A contact is closed, up to rounding, if both its gap and its speed are smaller than this.
 
@@ -27,6 +27,7 @@ class GapPlaces:
     names: tuple[str, ...]  # of the coordinates, in which the sum of a gap has the place of one of its terms
     order: tuple[int, ...]  # the places of sums, in the order in which their terms are eliminated
     contacts: tuple[tuple[int, int], ...]  # the place of each contact's sum, and +1, or -1 if the coordinate is minus the sum
+    surfaces: tuple[tuple[int, int], ...]  # of each surface likewise
 
 
 class InGapCoordinates(ContactModel):
@@ -53,10 +54,18 @@ class InGapCoordinates(ContactModel):
     @property
     def contacts(self) -> tuple[Contact, ...]:
         """The contacts, each of which holds one of the coordinates."""
-        pairs = zip(super().contacts, self.places.contacts, strict=True)
+        return self._on_coordinates(super().contacts, self.places.contacts)
+
+    @property
+    def surfaces(self) -> tuple[Surface, ...]:
+        """The surfaces, each of one of the coordinates."""
+        return self._on_coordinates(super().surfaces, self.places.surfaces)
+
+    def _on_coordinates(self, parts: Any, places: tuple[tuple[int, int], ...]) -> tuple[Any, ...]:
+        """Contacts or surfaces of single coordinates."""
         return tuple(
-            replace(c, coordinate=self.coordinates[i], sign=s * c.sign, position=c.position if s > 0 else -c.position)
-            for c, (i, s) in pairs
+            replace(part, coordinate=self.coordinates[i], sign=s * part.sign, position=part.position if s > 0 else -part.position)
+            for part, (i, s) in zip(parts, places, strict=True)
         )
 
     @property
@@ -69,9 +78,10 @@ class InGapCoordinates(ContactModel):
         names = self.own_class.coordinates
         rows = [[float(i == j) for j in range(len(names))] for i in range(len(names))]
         moving: list[dict[str, Any]] = [{} for _ in names]
-        for contact, (i, sign) in zip(super().contacts, self.places.contacts, strict=True):
+        parts: list[Contact | Surface] = [*super().contacts, *super().surfaces]
+        for part, (i, sign) in zip(parts, self.places.contacts + self.places.surfaces, strict=True):
             if sign > 0 and i in self.places.order:
-                given = terms_of(contact)
+                given = terms_of(part)
                 rows[i] = [given.get(name, 0.0) for name in names]
                 moving[i] = {name: factor for name, factor in given.items() if name not in names}
         return rows, moving
@@ -122,10 +132,10 @@ class InGapCoordinates(ContactModel):
             [_as_given([_weighted(column, [row[j] for row in right]) for j in range(len(back))]) for column in columns]
         )
 
-    def force(self, t: Any, theta: Any, velocity: Any, load: Any) -> Any:
+    def force(self, t: Any, theta: Any, velocity: Any, load: Any, *sides: Any) -> Any:
         """T' (r - M q_0'')."""
         q, v = self.own(t, theta, load), self.own(t, velocity, load, 1)
-        pushed, mass = _each_of(super().force(t, q, v, load)), _rows_of(super().mass_matrix(q))
+        pushed, mass = _each_of(super().force(t, q, v, load, *sides)), _rows_of(super().mass_matrix(q))
         carried = _each_of(self.own(t, _as_given([0.0] * len(pushed)), load, 2))
         inertia = [_weighted(row, carried) for row in mass]
         pushed = [f if is_zero(a) else f - a for f, a in zip(pushed, inertia, strict=True)]
@@ -174,7 +184,7 @@ def _class_in(cls: Any, places: GapPlaces) -> Any:
 IN_GAPS = "InGapCoordinates"  # behind the name of a model's class, the name of its class in these coordinates
 
 
-def terms_of(contact: Contact) -> dict[str, Any]:
+def terms_of(contact: Contact | Surface) -> dict[str, Any]:
     """The coefficients of the coordinates and load channels in the sum that a contact keeps on one side of its position."""
     return {contact.coordinate: 1.0} if isinstance(contact.coordinate, str) else dict(contact.coordinate)
 
@@ -185,7 +195,7 @@ def _places_of(model: Any) -> GapPlaces | None:
     Each sum takes the place of that of its coordinates which has the largest coefficient after the elimination of the earlier
     sums, of several the last. Coordinates that a contact holds alone, or along which a friction acts, keep their places.
     """
-    contacts, names, order = model.contacts, model.coordinates, []
+    contacts, names, order = (*model.contacts, *model.surfaces), model.coordinates, []
     if all(isinstance(contact.coordinate, str) for contact in contacts):
         return None
     called, found = list(names), dict[int, tuple[int, int]]()
@@ -207,21 +217,22 @@ def _places_of(model: Any) -> GapPlaces | None:
             order.append(place)
             same = [(place, 1)]
         found[number] = same[0]
-    return GapPlaces(tuple(called), tuple(order), tuple(found.values()))
+    count, every = len(model.contacts), tuple(found.values())
+    return GapPlaces(tuple(called), tuple(order), every[:count], every[count:])
 
 
-def _no_place(contact: Contact, contacts: Sequence[Contact], rubbed: set[int]) -> str:
+def _no_place(contact: Contact | Surface, contacts: Sequence[Contact | Surface], rubbed: set[int]) -> str:
     """Why a contact's sum cannot be a coordinate, in words."""
     others = ", ".join(other.name for other in contacts if other is not contact)
     kept, beside = _called(contact), " and from the coordinates of frictions" * bool(rubbed)
     return (
-        f"the contact {contact.name!r} keeps {kept}, which follows from what {others} keep{beside}, up to a displacement, so "
-        "that it cannot be a coordinate beside them; leave the contact out, give a sum that another contact keeps too the same "
-        "coefficients, or let it keep a coordinate of its own, such as that of a heavy wall"
+        f"the {type(contact).__name__.lower()} {contact.name!r} keeps {kept}, which follows from what {others} keep{beside}, up "
+        "to a displacement, so that it cannot be a coordinate beside them; leave it out, give sums that are the same the "
+        "same coefficients, or let it keep a coordinate of its own, such as that of a heavy wall"
     )
 
 
-def _called(contact: Contact) -> str:
+def _called(contact: Contact | Surface) -> str:
     """The name of a contact's sum, such as y_minus_x; with other coefficients than 1 and -1 it is called after the contact."""
     terms = {name: float(factor) for name, factor in terms_of(contact).items()}
     if any(abs(factor) != 1.0 for factor in terms.values()):

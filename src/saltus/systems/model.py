@@ -11,7 +11,7 @@ import numpy as np
 from saltus.errors import ParameterError, near, shown
 
 if TYPE_CHECKING:
-    from saltus.systems.contact_model import Contact, Friction
+    from saltus.systems.contact_model import Contact, Friction, Surface
 
 
 class MarginKind(StrEnum):
@@ -108,6 +108,11 @@ class Model:
         return ()
 
     @property
+    def surfaces(self) -> tuple[Surface, ...]:
+        """The surfaces on whose sides the equations differ; a `ContactModel` may have some."""
+        return ()
+
+    @property
     def contact(self) -> Any:
         """The coordinate at contact; 0 without one."""
         return 0.0
@@ -124,11 +129,11 @@ class Model:
 
     @property
     def holds_coordinates(self) -> bool:
-        """Whether contacts or frictions may hold its coordinates one by one, while the others move on.
+        """Whether contacts or frictions may hold its coordinates one by one, while the others move on, or it has surfaces.
 
         A perturbation of a coordinate that is held is lost. Such a model may be at rest in many states.
         """
-        return bool(self.contacts or self.frictions)
+        return bool(self.contacts or self.frictions or self.surfaces)
 
     @property
     def names_its_contacts(self) -> bool:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import ParameterError, SaltusError, shown
-from saltus.systems.contact_model import MOST_CONTACTS, MOST_FRICTIONS, Contact, ContactModel
+from saltus.systems.contact_model import MOST_CONTACTS, MOST_FRICTIONS, Contact, ContactModel, Surface
 from saltus.systems.gap_coordinates import InGapCoordinates
 from saltus.systems.impact_laws import ImpactLaw
 from saltus.systems.load import DeclaredLoad, Load
@@ -20,7 +20,7 @@ from saltus.systems.model import Model, OneContactModel, check_one_contact
 # The parts of the contracts of the two siblings: a class that defines one of them and is of neither has the wrong base.
 OWN_PARTS = {
     OneContactModel: ("sides", "gap", "reset", "inelastic_factor"),
-    ContactModel: ("contacts", "frictions", "force", "mass_matrix", "normal_forces", "transfers"),
+    ContactModel: ("contacts", "frictions", "surfaces", "force", "mass_matrix", "normal_forces", "transfers"),
 }
 OFF_CONTACT = 1e-9  # the largest gap at the contact, relative to its rate, that may be rounding; an error of a model is larger
 PROBE = (0.37, 0.21, 0.13)  # time, coordinate and velocity at which a model's answers are counted: any numbers would do
@@ -74,6 +74,8 @@ def _check_class(kind: type[Model]) -> None:
 def _check_arguments(kind: type[Model], name: str, function: FunctionType) -> None:
     """Refuse a method that does not take the arguments of the contract's."""
     wanted = list(inspect.signature(function).parameters)
+    if name == "force" and getattr(kind, "surfaces", ()) not in ((), Model.surfaces):
+        wanted.append("sides")
     try:
         inspect.signature(getattr(kind, name)).bind(*wanted)
     except TypeError:
@@ -126,16 +128,20 @@ def check_contact_model(model: ContactModel) -> None:
     contacts, frictions, kind = model.contacts, model.frictions, type(model).__name__
     if model.sides:
         raise ParameterError(f"{kind} is a ContactModel, so it has no sides: leave them out", "model")
-    for what, count, most in (("contacts", len(contacts), MOST_CONTACTS), ("frictions", len(frictions), MOST_FRICTIONS)):
+    rows = ("frictions and surfaces", len(frictions) + len(model.surfaces), MOST_FRICTIONS)
+    for what, count, most in (("contacts", len(contacts), MOST_CONTACTS), rows):
         if count > most:
             raise ParameterError(f"{kind} has {count} {what}, and at most {most} can be followed", "model")
-    names = [*(contact.name for contact in contacts), *(friction.name for friction in frictions)]
+    parts: tuple[Contact | Surface, ...] = (*contacts, *model.surfaces)
+    names = [*(part.name for part in parts), *(friction.name for friction in frictions)]
     if len(set(names)) < len(names):
-        raise ParameterError(f"contacts and frictions of {kind} must have names of their own, got {', '.join(names)}", "model")
-    for contact in contacts:
+        raise ParameterError(
+            f"contacts, frictions and surfaces of {kind} must have names of their own, got {', '.join(names)}", "model"
+        )
+    for contact in parts:
         if isinstance(contact.coordinate, str) and contact.coordinate not in model.coordinates:
-            known = ", ".join(model.coordinates)
-            raise ParameterError(f"the contact {contact.name!r} holds {contact.coordinate!r}, but {kind} has {known}", "model")
+            known, what = ", ".join(model.coordinates), type(contact).__name__.lower()
+            raise ParameterError(f"the {what} {contact.name!r} holds {contact.coordinate!r}, but {kind} has {known}", "model")
         if not isinstance(contact.coordinate, str):
             _check_sum(model, contact)
     for a in contacts:
@@ -160,9 +166,10 @@ def _check_frictions(model: ContactModel) -> None:
         taken.append(friction.coordinate)
 
 
-def _check_sum(model: ContactModel, contact: Contact) -> None:
+def _check_sum(model: ContactModel, contact: Contact | Surface) -> None:
     """Refuse a sum of coordinates and displacements of the ground that a contact cannot keep on one side."""
-    where, names, given = f"the contact {contact.name!r} of {type(model).__name__}", model.coordinates, contact.coordinate
+    where = f"the {type(contact).__name__.lower()} {contact.name!r} of {type(model).__name__}"
+    names, given = model.coordinates, contact.coordinate
     if not isinstance(given, Mapping) or not given:
         raise ParameterError(
             f"{where} must hold a coordinate, or a dictionary such as {{'y': 1.0, 'x': -1.0}}, got {shown(given)}", "model"

@@ -41,8 +41,9 @@ def read_start(
     ParameterError
         A name is no coordinate (the message has similar names), a coordinate is not given, or a value is no finite number.
     """
-    if isinstance(system.model, InGapCoordinates) and not coordinates.keys() & set(system.model.coordinates):
-        own = system.with_(model=system.model.as_given())
+    model: Any = system.model
+    if isinstance(model, InGapCoordinates) and coordinates.keys() & {*model.own_class.coordinates} - {*model.coordinates}:
+        own = system.with_(model=model.as_given())
         return np.concatenate(own.to_gaps(time, *np.split(read_start(own, velocity, coordinates, arguments), 2)))
     names = system.model.coordinates
     positions = _positions(system, coordinates, arguments)

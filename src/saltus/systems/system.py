@@ -345,7 +345,10 @@ def check_system(
         wanted = "one coordinate" if coordinates == 1 else f"{coordinates} coordinates"
         raise ParameterError(f"{asking} is for models with {wanted}, and this one has {', '.join(names)}", "system")
     if system.model.holds_coordinates and not several_contacts:
-        parts = ", ".join([part.name for part in system.model.contacts] + [part.name for part in system.model.frictions])
+        model = system.model
+        parts = ", ".join(
+            [*(c.name for c in model.contacts), *(f.name for f in model.frictions), *(s.name for s in model.surfaces)]
+        )
         raise ParameterError(
             f"{asking} is for models with one contact so far, and {type(system.model).__name__} has {parts}; use simulate",
             "system",
@@ -369,6 +372,8 @@ def image_of(model: Model, states: np.ndarray) -> np.ndarray:
 
 def contact_images(model: Model, impact: ImpactLaw) -> tuple[int, ...] | None:
     """The index of the mirror image of each contact, then of each friction; None if one has no image or the laws differ."""
+    if model.surfaces:
+        return None  # those of surfaces are not looked for
     contacts, frictions, count = model.contacts, model.frictions, len(model.contacts)
     found = []
     for contact in contacts:

@@ -15,7 +15,6 @@ from saltus.systems import (
     System,
     apart,
     constrained_acceleration,
-    mass_and_force,
     normal_forces,
     numbers,
     reactions,
@@ -95,7 +94,7 @@ class Trace:
     `restitution`, the rows of E; and `positions` of the contacts. Its leaves include `free`, 1 for each coordinate that no
     contact holds, else 0. A model with frictions has, behind the reactions of the contacts, the two margins of each friction
     (`stick_margins`), and `ground_speeds`. Its leaves include `slide`, the direction in which each friction slides, 0 if it
-    sticks.
+    sticks. A surface has rows like a friction, with margins of 1, its position in place of a speed, and as `slide` its side.
 
     With a tangent `acceleration` goes on after the model's own `dof` with that of its `columns`. Column j is the derivative to
     the j-th initial coordinate, then to the j-th initial velocity, then to the number at the j-th of `paths`. With u = dq/dc and
@@ -131,7 +130,7 @@ class Trace:
     signs: tuple[int, ...] = ()  # of the contacts
     contact_coordinates: tuple[int, ...] = ()  # the coordinate that each contact holds
     ground_speeds: list[Expr] = field(default_factory=list)
-    friction_coordinates: tuple[int, ...] = ()  # the coordinate of each friction
+    friction_coordinates: tuple[int, ...] = ()  # the coordinate of each friction, then -1 less that of each surface
 
     @property
     def several(self) -> bool:
@@ -316,25 +315,26 @@ def _known_number(expression: Expr) -> float | Fraction | None:
 def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> list[Any]:
     """Trace the accelerations of a model with several contacts, for any choice of closed ones."""
     model, load, contacts, frictions = twin.contact_model, twin.load, twin.contact_model.contacts, twin.contact_model.frictions
-    free = [Expr("free", (), i) for i in range(result.dof)]
-    slides = [Expr("slide", (), k) for k in range(len(frictions))]
-    mass, _ = mass_and_force(model, t, q, v, load)
+    slides = [Expr("slide", (), k) for k in range(len(frictions) + len(model.surfaces))]
+    mass = [[model.mass_matrix(q)]] if result.dof == 1 else [list(row) for row in model.mass_matrix(q)]
     if frictions and not apart(model, mass):
         raise TraceError(
             f"the mass matrix of {type(model).__name__} connects a coordinate with a contact to one with a friction: impacts "
             "would act on what sticks, which is not followed; choose coordinates in which it does not"
         )
     accelerations = [Expr("acceleration", (), i) for i in range(result.dof)]
-    holding = [*reactions(model, t, q, v, accelerations, load), *stick_margins(model, t, q, v, accelerations, load)]
-    result.reactions = [combine("add", r, 0.0) for r in holding]
-    result.ground_speeds = [combine("add", friction.ground_speed, 0.0) for friction in frictions]
-    result.friction_coordinates = tuple(model.coordinates.index(friction.coordinate) for friction in frictions)
+    holding = [f for forces in (reactions, stick_margins) for f in forces(model, t, q, v, accelerations, load, slides)]
+    result.reactions = [combine("add", r, 0.0) for r in (*holding, *[1.0] * (2 * len(model.surfaces)))]
+    speeds = [*(friction.ground_speed for friction in frictions), *(surface.position for surface in model.surfaces)]
+    result.ground_speeds = [combine("add", speed, 0.0) for speed in speeds]
+    rubbed, passed = ([model.coordinates.index(each.coordinate) for each in parts] for parts in (frictions, model.surfaces))
+    result.friction_coordinates = (*rubbed, *(-1 - place for place in passed))
     result.mass = [combine("add", entry, 0.0) for row in mass for entry in row]
     result.restitution = [combine("add", entry, 0.0) for row in twin.impact.restitution_matrix(model) for entry in row]
     result.positions = [combine("add", contact.position, 0.0) for contact in contacts]
     result.signs = tuple(contact.sign for contact in contacts)
     result.contact_coordinates = tuple(model.coordinates.index(contact.coordinate) for contact in contacts)
-    return constrained_acceleration(model, t, q, v, load, free, slides)
+    return constrained_acceleration(model, t, q, v, load, [Expr("free", (), i) for i in range(result.dof)], slides)
 
 
 def _trace_margins(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any, side: Expr, stop_at: tuple[str, ...]) -> None:

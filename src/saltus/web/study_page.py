@@ -78,6 +78,8 @@ def page(
     True
     """
     check_system(system, "page", several_contacts=True)
+    if system.model.surfaces:
+        raise ParameterError(f"a page follows no surfaces so far, and {type(system.model).__name__} has some", "system")
     file = Path(f"{type(system.model).__name__}.html" if path is None else path)
     if file.suffix.lower() not in (".html", ".htm"):
         raise ParameterError(f"path must be the name of a page, such as 'study.html', got {str(path)!r:.80}", "path")

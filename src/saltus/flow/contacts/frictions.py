@@ -3,8 +3,9 @@ force is bounded on both sides.
 
 The kernel's array of contacts has a row for each friction behind those of the contacts, in the columns of `FrictionColumn`;
 `frictions` are these rows. The guard of a friction that slides is the speed q' - w in its direction; a friction that sticks has
-two guards, its margins (`stick_margins`). The directions are kept in the parameters of `env`, before the numbers that say which
-coordinates are free.
+two guards, its margins (`stick_margins`). A surface has a row behind those of the frictions: its guard is the distance of the
+coordinate from its position on its side, and when it is reached the side changes. Directions and sides are kept in the
+parameters of `env`, before the numbers that say which coordinates are free.
 
 Its compiled part goes into one module with that of `kernel.py`; the words of `motion` are those of `flow/kernel/memory.py`.
 """
@@ -13,7 +14,7 @@ from __future__ import annotations
 
 from saltus.flow.contacts.complementarity import eliminate
 from saltus.flow.contacts.impacts import record_contact_event
-from saltus.flow.contacts.layout import FrictionColumn
+from saltus.flow.contacts.layout import FrictionColumn, NoMargin
 from saltus.flow.contacts.tangent import move_columns, note_shifts, slope
 from saltus.flow.kernel.layout import EXACT, ZERO, EventCode, Mode
 from saltus.flow.kernel.roots import NEVER, SIMPLE, contact_root, leading
@@ -40,6 +41,28 @@ def hold_frictions(motion):
 
 
 @lean_jit
+def begin_on_surfaces(motion, t):
+    """Choose the sides of surfaces on which a motion starts: those to which it moves on; False if there is none."""
+    for _ in range(2):
+        hold_frictions(motion)
+        agrees = True
+        for k in range(motion.frictions.shape[0]):
+            row = motion.frictions[k]
+            if row[FrictionColumn.MARGIN] != NoMargin.SURFACE:
+                continue
+            expand(motion, t, 1.0, motion.order)
+            sliding_series(motion, k, 1.0 * row[FrictionColumn.SLIDES], motion.order, motion.gap_series)
+            i = leading(motion.gap_series, 0, motion.order)
+            row[FrictionColumn.SKIP] = i
+            if i > 0 and i < motion.order and motion.gap_series[i] < 0.0:
+                row[FrictionColumn.SLIDES] *= -1
+                agrees = False
+        if agrees:
+            return True
+    return False
+
+
+@lean_jit
 def slide_bits(motion, count):
     """The direction of each friction plus 1 (0, 1 or 2), in two bits each, behind the bits of `count` contacts."""
     bits = 0
@@ -56,8 +79,10 @@ def ground_speed(motion, k):
 
 @lean_jit
 def sliding_series(motion, k, direction, order, g):
-    """The Taylor coefficients of a friction's sliding speed along a direction."""
+    """The Taylor coefficients of a friction's sliding speed along a direction, or of the distance from a surface on a side."""
     v = motion.velocity_series[motion.frictions[k, FrictionColumn.COORDINATE]]
+    if motion.frictions[k, FrictionColumn.MARGIN] == NoMargin.SURFACE:
+        v = motion.coordinate_series[motion.frictions[k, FrictionColumn.COORDINATE]]
     for i in range(order + 1):
         g[i] = direction * v[i]
     g[0] -= direction * ground_speed(motion, k)
@@ -112,9 +137,11 @@ def first_friction(motion, count, h, whole):
 def reach_ground_speed(motion, count, t, k, which, later):
     """Take the motion, with the tangent's columns, to the instant at which a friction's guard is 0.
 
-    If that is the sliding speed, it is set to exactly 0; the instant moves by dt = -(z - w_c) / a.
+    If that is the sliding speed, it is set to exactly 0; the instant moves by dt = -(z - w_c) / a. At a surface the coordinate is
+    set to its position, and dt = -(u - p_c) / v.
     """
     own, rest = motion.own, motion.frictions[k, FrictionColumn.COORDINATE]
+    crossed = motion.frictions[k, FrictionColumn.MARGIN] == NoMargin.SURFACE
     if motion.columns > 0:
         expand(motion, t, 1.0, 1)
         if which < 2:
@@ -127,21 +154,31 @@ def reach_ground_speed(motion, count, t, k, which, later):
                 moved = slope(motion, j, motion.solver_numbers.size - motion.frictions.shape[0] + k)
                 sliding = motion.velocities[own * (1 + j) + rest] - moved
                 motion.shifts[j] = -sliding / motion.acceleration_series[rest, 0]
+                if crossed:
+                    motion.shifts[j] = -(motion.coordinates[own * (1 + j) + rest] - moved) / motion.velocities[rest]
         move_columns(motion, 1.0)
-    if which == 2:
+    if crossed:
+        motion.coordinates[rest] = ground_speed(motion, k)
+    elif which == 2:
         motion.velocities[rest] = ground_speed(motion, k)
     motion.frictions[k, FrictionColumn.REACHED] = 3 if which == 2 else 1 + which if later else 0
 
 
 @lean_jit
 def undecided(motion):
-    """The frictions with exactly the speed of their ground, as bits; for the others the direction in which they slide is noted.
+    """The frictions with exactly the speed of their ground, as bits; for the others the direction in which they slide is noted,
+    and for a surface that has just been reached the other side.
 
     If blocks move alike, the sliding speed of one may have changed its sign, within rounding, at the instant of another one's
     event. Its direction is then kept, so that it has its own event next, to which it takes the tangent's columns.
     """
     bits = 0
     for k in range(motion.frictions.shape[0]):
+        if motion.frictions[k, FrictionColumn.MARGIN] == NoMargin.SURFACE:
+            if motion.frictions[k, FrictionColumn.REACHED] == 3:
+                motion.frictions[k, FrictionColumn.SLIDES] *= -1
+                motion.frictions[k, FrictionColumn.SKIP] = 1
+            continue
         place = motion.frictions[k, FrictionColumn.COORDINATE]
         rate = motion.velocities[place] - ground_speed(motion, k)
         if rate == 0.0:
@@ -200,6 +237,8 @@ def record_slides(motion, before, t):
         before //= 3
         if slides != was:
             kind = EventCode.SLIP if was == 0 else EventCode.STICK if slides == 0 else EventCode.REVERSAL
+            if motion.frictions[k, FrictionColumn.MARGIN] == NoMargin.SURFACE:
+                kind = EventCode.CROSSING
             record_contact_event(motion, kind, 1 << (motion.contacts.shape[0] + k), t)
             note_shifts(motion, motion.shifts)
 
@@ -252,5 +291,6 @@ def all_stand(motion):
             return False
     moves = False
     for k in range(motion.frictions.shape[0]):
-        moves = moves or ground_speed(motion, k) != 0.0
+        is_friction = motion.frictions[k, FrictionColumn.MARGIN] != NoMargin.SURFACE
+        moves = moves or (is_friction and ground_speed(motion, k) != 0.0)
     return not moves

@@ -20,6 +20,7 @@ import numpy as np
 from saltus.flow.contacts.closings import choose_closed, contact_impact, note_ties, rests_in_a_row
 from saltus.flow.contacts.frictions import (
     all_stand,
+    begin_on_surfaces,
     first_friction,
     friction_step_size,
     hold_frictions,
@@ -159,6 +160,8 @@ def decide_contacts(motion):
     settled = end_accumulation_of(motion, t)
     candidates, before = closed_bits(motion), slides_before(motion)
     fill_contact_matrices(motion)
+    if motion.leave_by == 1 and not begin_on_surfaces(motion, t):
+        return Status.NOT_UNIQUE
     still = undecided(motion)
     if (candidates or still) and not choose_closed(motion, candidates, still, t):
         note_ties(motion, candidates, t)

@@ -12,7 +12,7 @@ in all lanes (`one_free.py`).
 from __future__ import annotations
 
 from saltus.flow.contacts.lane_impacts import closed_lanes, resolve_impacts, write_closed
-from saltus.flow.contacts.layout import ContactColumn, FrictionColumn
+from saltus.flow.contacts.layout import ContactColumn, FrictionColumn, NoMargin
 from saltus.flow.kernel.layout import Mode
 from saltus.flow.lanes.lane_steps import both_at, commit, find_contact, natural_step, row_step, series_true, state_size, sweep
 from saltus.flow.lanes.memory import FAST, Gap, Step, Stretch
@@ -49,10 +49,19 @@ def begin_contact(lane, env, state):
             mode = Mode.CONTACT
     for k in range(sizes.frictions):
         coordinate, row = sizes.coordinates[count + k], contacts[count + k]
-        rate = state[state.size // 2 + coordinate] - solved[own * own + count * count + count + k]
+        surface = coordinate < 0
+        coordinate = -1 - coordinate if surface else coordinate
+        beyond, rate = state[coordinate], state[state.size // 2 + coordinate]
+        if not surface:
+            beyond = rate
+        beyond -= solved[own * own + count * count + count + k]
         row[FrictionColumn.COORDINATE], row[FrictionColumn.SKIP] = coordinate, 0
-        row[FrictionColumn.SLIDES] = 1 if rate > 0.0 else -1 if rate < 0.0 else 0
+        row[FrictionColumn.SLIDES] = 1 if beyond > 0.0 else -1 if beyond < 0.0 else 0
         row[FrictionColumn.MARGIN] = row[FrictionColumn.REACHED] = 0
+        if surface:
+            row[FrictionColumn.MARGIN] = NoMargin.SURFACE
+            if beyond == 0.0:
+                row[FrictionColumn.SLIDES] = -1 if rate < 0.0 else 1
         mode = Mode.CONTACT if mode == Mode.ARC else mode
     lane.leave_by = 1 if mode == Mode.CONTACT else 0  # derivatives are then one-sided
     return mode, 1 + write_closed(lane, contacts[:count])

@@ -22,13 +22,19 @@ class ContactColumn(IntEnum):
 
 
 class FrictionColumn(IntEnum):
-    """Columns of the rows behind those of the contacts, one row for each friction."""
+    """Columns of the rows behind those of the contacts, one row for each friction, then one for each surface."""
 
     COORDINATE = 0  # the coordinate along which it acts
-    SLIDES = 1  # the direction in which it slides, +1 or -1; 0 if it sticks
+    SLIDES = 1  # the direction in which it slides, +1 or -1; 0 if it sticks; of a surface the side, +1 above its position
     SKIP = 2  # how many of the first Taylor coefficients of its guard are known to be 0 at the start of a step
-    MARGIN = 3  # if it sticks, the number of the margin that SKIP refers to
-    REACHED = 4  # 1 or 2: this margin has just reached 0; 3: the sliding speed has
+    MARGIN = 3  # if it sticks, the number of the margin that SKIP refers to; a `NoMargin` for a surface
+    REACHED = 4  # 1 or 2: this margin has just reached 0; 3: the sliding speed has, or the surface is reached
+
+
+class NoMargin(IntEnum):
+    """In place of the number of a margin in a row of `FrictionColumn`."""
+
+    SURFACE = -1  # the row is that of a surface
 
 
 class SegmentPlan(IntEnum):

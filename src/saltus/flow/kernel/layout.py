@@ -27,7 +27,8 @@ class EventCode(IntEnum):
     STICK = 7
     SLIP = 8
     REVERSAL = 9
-    RESET_SLOPES = 10  # no event, but a request to `tangent`: the derivatives of the reset alone, at a fixed instant
+    CROSSING = 10
+    RESET_SLOPES = 11  # no event, but a request to `tangent`: the derivatives of the reset alone, at a fixed instant
 
 
 class RestDetail(IntEnum):

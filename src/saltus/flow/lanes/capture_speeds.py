@@ -33,8 +33,8 @@ def capture_speeds(
     asked = [name for name in limits if name not in (*system.model.stops, *lifted)]
     if asked:
         raise ParameterError(f'until="rest" proves nothing about {asked[0]}; leave out either it or stop_at', "until")
-    if system.model.frictions:
-        return 0.0  # nothing is proved about sticking frictions
+    if system.model.frictions or system.model.surfaces:
+        return 0.0  # nothing is proved about sticking frictions and about motions through surfaces
     if system.model.contacts:
         return np.where(keeps_rest(system, columns), math.inf, 0.0)
     if not system.model.sides:

@@ -147,7 +147,7 @@ class LaneSizes(NamedTuple):
     constant_guards: int
     contacts: int  # the number of contacts of a model with several
     frictions: int
-    coordinates: np.ndarray  # of each contact, then of each friction
+    coordinates: np.ndarray  # of each contact, of each friction, and -1 less that of each surface
     signs: np.ndarray  # of each contact
 
 

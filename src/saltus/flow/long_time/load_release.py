@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from saltus.checks import answered
-from saltus.systems import ContactModel, Load, System, check_system
+from saltus.systems import ContactModel, Load, System, check_system, mass_and_force
 
 RELEASE_SAMPLES = 64  # per forcing period and order of the highest harmonic: the contact acceleration has no narrower peak
 
@@ -59,9 +59,9 @@ def contact_pull(system: System, side: int) -> Callable[[Any], Any]:
 
 def _force_at_rest(model: ContactModel, t: Any, position: list[float], load: Load) -> list[Any]:
     """r(t, q, 0), as a list."""
-    if len(position) == 1:
-        return [model.force(t, position[0], 0.0, load)]
-    return list(model.force(t, tuple(position), (0.0,) * len(position), load))
+    one = len(position) == 1
+    q, v = (position[0], 0.0) if one else (tuple(position), (0.0,) * len(position))
+    return mass_and_force(model, t, q, v, load)[1]
 
 
 @answered

@@ -412,7 +412,7 @@ def _rest_lasts(system: System) -> bool:
     coordinate."""
     contacts, names = system.model.contacts, system.model.coordinates
     known = not contacts or sorted(contact.coordinate for contact in contacts) == sorted(names)
-    known &= not system.model.frictions
+    known &= not (system.model.frictions or system.model.surfaces)
     return known and not load_releases(system)
 
 

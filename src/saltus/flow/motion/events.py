@@ -32,6 +32,7 @@ class EventKind(StrEnum):
     STICK = "stick"  #: a friction changes from sliding to sticking
     SLIP = "slip"  #: a friction changes from sticking to sliding
     REVERSAL = "reversal"  #: a friction slides the other way without having stuck
+    CROSSING = "crossing"  #: the motion passes a surface to its other side
 
 
 EVENT_KINDS = tuple(EventKind)  # by the kernel's numbers
@@ -231,6 +232,12 @@ def modes_of(model: Model, side: np.ndarray) -> tuple[np.ndarray, list[np.ndarra
     count, number = len(model.contacts), np.asarray(side).astype(np.int64) - 1
     slides = [(number >> (count + 2 * k) & 3) - 1 for k in range(len(model.frictions))]
     return number & ((1 << count) - 1), slides
+
+
+def sides_of(model: Model, side: np.ndarray) -> list[np.ndarray]:
+    """The side of each surface, +1 or -1, from the numbers `side` of motions."""
+    first, number = len(model.contacts) + 2 * len(model.frictions), np.asarray(side).astype(np.int64) - 1
+    return [each.sign * ((number >> (first + 2 * k) & 3) - 1) for k, each in enumerate(model.surfaces)]
 
 
 class Stop(StrEnum):

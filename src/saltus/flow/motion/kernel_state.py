@@ -11,7 +11,7 @@ import numpy as np
 
 from saltus.checks import LIMITS, free_memory
 from saltus.errors import MotionError, ParameterError
-from saltus.flow.contacts.layout import ContactColumn, FrictionColumn
+from saltus.flow.contacts.layout import ContactColumn, FrictionColumn, NoMargin
 from saltus.flow.kernel.compiled import Program, load_contacts_kernel, load_kernel, taylor_order
 from saltus.flow.kernel.layout import EventCode, Mode, side_of_state
 from saltus.flow.kernel.memory import EventBuffers, StepBuffers, motion_record
@@ -133,7 +133,7 @@ class ContactState(KernelState):
         names, position, speeds = request.system.model.coordinates, request.position, request.speeds
         held, rubbed = run.trace.contact_coordinates, run.trace.friction_coordinates
         contacts = np.zeros((len(held) + len(rubbed), len(ContactColumn)), dtype=np.int64)
-        contacts[:, ContactColumn.COORDINATE] = held + rubbed
+        contacts[:, ContactColumn.COORDINATE] = held + tuple(max(place, -1 - place) for place in rubbed)
         for row, contact in zip(contacts[: len(held)], request.system.model.contacts, strict=True):
             place = names.index(contact.coordinate)
             gap, rate = contact.gap(float(position[place])), contact.sign * float(speeds[place])
@@ -145,9 +145,14 @@ class ContactState(KernelState):
             row[ContactColumn.SKIP] = int(gap == 0.0)
             if gap == 0.0:
                 start.state[place] = float(contact.position)
-        for row, friction in zip(contacts[len(held) :], request.system.model.frictions, strict=True):
+        for row, friction in zip(contacts[len(held) :], request.system.model.frictions, strict=False):
             rate = float(speeds[names.index(friction.coordinate)]) - float(friction.ground_speed)
             row[FrictionColumn.SLIDES] = int(np.sign(rate))
+        surfaces = request.system.model.surfaces
+        for row, surface in zip(contacts[len(contacts) - len(surfaces) :], surfaces, strict=True):
+            place = names.index(surface.coordinate)
+            row[FrictionColumn.MARGIN] = NoMargin.SURFACE
+            row[FrictionColumn.SLIDES] = int(np.sign(position[place] - float(surface.position)) or np.sign(speeds[place]) or 1)
         start.numbers["leave_by"] = 1  # no release is recorded at the start
         return cls(start.array, start.state, contacts)
 
@@ -188,7 +193,7 @@ class Recorder:
         self.steps = StepBuffers(np.empty((size, 2), dtype=np.int64), np.empty((size, 2)), np.empty((size, rows, order + 2)))
         model = request.system.model
         self._contacts = [contact.name for contact in model.contacts]
-        self._frictions = [friction.name for friction in model.frictions]
+        self._frictions = [*(friction.name for friction in model.frictions), *(surface.name for surface in model.surfaces)]
         self._several = model.holds_coordinates
         self._width = 1 + 2 * dof + len(self._contacts) if self._several else 3  # the numbers of an event before its shifts
         self.events = EventBuffers(np.empty((MOST.buffer, 4), dtype=np.int64), np.empty((MOST.buffer, self._width + columns)))

@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.checks import Numbers, check_count, instants
 from saltus.errors import ParameterError, near
-from saltus.flow.motion.events import EventKind, Impacts, MotionEvents, Stop, modes_of
+from saltus.flow.motion.events import EventKind, Impacts, MotionEvents, Stop, modes_of, sides_of
 from saltus.flow.motion.validity import DenseOutput, Validity, ValidityCheck
 from saltus.notebook import html_table
 from saltus.result import Result, provenance, table_of
@@ -129,6 +129,12 @@ class Motion(Result):
         model = self.system.model
         _, slides = modes_of(model, np.array(self.side))
         return {friction.name: int(s) for friction, s in zip(model.frictions, slides, strict=True)}
+
+    @property
+    def sides(self) -> dict[str, int]:
+        """The side of each surface at the end, +1 or -1, of a model with surfaces."""
+        model = self.system.model
+        return {each.name: int(s) for each, s in zip(model.surfaces, sides_of(model, np.array(self.side)), strict=True)}
 
     def closed_at(self, time: float) -> int:
         """The contacts that are closed just after a time, of a model with several: the sum of 2^i over them.
@@ -335,6 +341,9 @@ def _add_contacts(motion: Motion, dataset: xarray.Dataset, side: np.ndarray) -> 
     for friction, direction in zip(model.frictions, slides, strict=True):
         text = f"direction in which {friction.name} slides, 0 where it sticks"
         dataset[f"sliding_{friction.name}"] = ("time", direction.astype(np.int8), {"units": "1", "long_name": text})
+    for surface, beside in zip(model.surfaces, sides_of(model, side), strict=True):
+        text = f"side of the surface {surface.name}"
+        dataset[f"side_{surface.name}"] = ("time", beside.astype(np.int8), {"units": "1", "long_name": text})
     if not contacts:
         return
     dataset["closed_contacts"] = ("time", closed.astype(np.int16), flags | {"long_name": "contacts that are closed"})

@@ -341,8 +341,9 @@ def state_rates(motion: Motion) -> np.ndarray:
     acceleration: Any
     if system.model.holds_coordinates:
         held = {contact.coordinate for contact in system.model.contacts if contact.name in motion.closed}
-        slides = list(motion.sliding.values())
-        held |= {friction.coordinate for friction, s in zip(system.model.frictions, slides, strict=True) if s == 0}
+        above = [each.sign * s for each, s in zip(system.model.surfaces, motion.sides.values(), strict=True)]
+        slides = [*motion.sliding.values(), *above]
+        held |= {friction.coordinate for friction, s in zip(system.model.frictions, slides, strict=False) if s == 0}
         free, q = [float(name not in held) for name in system.model.coordinates], motion.position
         acceleration = constrained_acceleration(system.model, motion.time, q, motion.velocity, system.load, free, slides)
     else:

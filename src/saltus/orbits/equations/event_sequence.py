@@ -25,6 +25,7 @@ CHANGES = (
     EventCode.STICK,
     EventCode.SLIP,
     EventCode.REVERSAL,
+    EventCode.CROSSING,
 )
 
 
@@ -199,7 +200,7 @@ def section_of(
 def _moves(system: System, side: np.ndarray) -> np.ndarray:
     """Whether a motion with these numbers `side` is not held altogether, (n,)."""
     modes = modes_in(system)
-    held = np.sum([*modes.closed(side), *(direction == 0 for direction in modes.slides(side))], axis=0)
+    held = np.sum([np.zeros(np.shape(side)), *modes.closed(side), *(direction == 0 for direction in modes.slides(side))], axis=0)
     return np.asarray(held < len(system.model.coordinates))
 
 

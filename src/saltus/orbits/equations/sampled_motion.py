@@ -150,8 +150,8 @@ class ContactModes(SideModes):
 
     def groups(self, position: Any) -> tuple[Group, ...]:
         """The contacts of each group if the mass matrix couples no coordinates of different groups; else one group of all."""
-        model = self.system.contact_model
-        contacts, frictions = self.system.contact_model.contacts, len(self.system.contact_model.frictions)
+        model, known = self.system.contact_model, self.system.contact_model
+        contacts, frictions = known.contacts, len(known.frictions) + len(known.surfaces)
         everything = (Group((1 << len(contacts) + frictions) - 1, (1 << len(contacts) + 2 * frictions) - 1),)
         names = dict.fromkeys(contact.group for contact in contacts)
         if len(names) < 2 or frictions:
