@@ -16,7 +16,7 @@ import saltus
 
 @dataclass(frozen=True, kw_only=True)
 class Backlash(saltus.ContactModel):
-    """x'' = p - k x - c x' + F and y'' = -p - c y', with the pull p = K (r - b) for r = y - x > b, K (r + b) for r < -b, else 0."""
+    """x'' = p - k x - c x' + F and y'' = -p - c y', with p = K (r - b) for r = y - x > b, K (r + b) for r < -b, else 0."""
 
     room: float = 0.25  # b
     mesh: float = 8.0  # K
