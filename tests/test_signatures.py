@@ -26,6 +26,7 @@ ALIKE = {
 # Names with two meanings, which are those of the field in both: what a dimension, a figure of a formula or a file is called.
 SEVERAL = {
     "changes": "values by dotted path, or parts of a system too",
+    "coordinate": "the name of one, or the coefficients of a sum of several",
     "coordinates": "starts of one motion or of many, by the names of the model's coordinates",
     "curves": "whether basins have their boundaries, or how many borders of a chart are followed",
     "data": "what was measured, or a system as a dictionary",

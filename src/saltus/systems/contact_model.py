@@ -139,8 +139,8 @@ class Surface:
 
     Examples
     --------
-    >>> saltus.Surface(name="stop", coordinate="x", position=1.0).side(1.5)
-    1.0
+    >>> saltus.Surface(name="stop", coordinate="x", position=1.0).side([0.5, 1.5])
+    array([-1.,  1.])
     """
 
     name: str

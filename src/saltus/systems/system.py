@@ -12,6 +12,7 @@ import numpy as np
 from saltus.errors import ParameterError, near, shown
 from saltus.files import parsed_json
 from saltus.notebook import html_table
+from saltus.public_functions import Numbers
 from saltus.systems.contact_model import ContactModel, normal_forces
 from saltus.systems.gap_coordinates import in_gap_coordinates
 from saltus.systems.impact_laws import ImpactLaw, VelocityReduction
@@ -135,7 +136,7 @@ class System:
         model = in_gap_coordinates(self.model)
         return self if model is self.model else System(model=model, load=self.load, impact=self.impact)
 
-    def from_gaps(self, time: Any, position: Any, velocity: Any) -> tuple[Any, Any]:
+    def from_gaps(self, time: Any, position: Any, velocity: Numbers) -> tuple[Any, Any]:
         """Coordinates and velocities of this system, for those of `in_gap_coordinates`; the same objects where that is itself.
 
         Parameters
@@ -150,7 +151,7 @@ class System:
             return position, velocity
         return model.own_states(time, position, velocity, self.load)  # type: ignore[no-any-return]
 
-    def to_gaps(self, time: Any, position: Any, velocity: Any) -> tuple[Any, Any]:
+    def to_gaps(self, time: Any, position: Any, velocity: Numbers) -> tuple[Any, Any]:
         """The inverse of `from_gaps`. Gaps of closed contacts, and their rates, are 0 if they are so up to rounding.
 
         Parameters
