@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from saltus.checks import Numbers
 from saltus.errors import ParameterError, near, shown
 from saltus.files import parsed_json
 from saltus.notebook import html_table
-from saltus.public_functions import Numbers
 from saltus.systems.contact_model import ContactModel, normal_forces
 from saltus.systems.gap_coordinates import in_gap_coordinates
 from saltus.systems.impact_laws import ImpactLaw, VelocityReduction
