@@ -16,6 +16,7 @@ MARKERS = {"LP": "o", "BPC": "s", "GR": "D"}
 KIND_NAMES = {"LP": "fold", "BPC": "symmetry breaking", "GR": "grazing"}
 SHOWN = (50.0, 200.0, 1000.0)  # B that are drawn
 WINDOW = (0.2655, 0.2875)  # Omega of the superharmonic resonance that is drawn, with its grazings
+HEIGHTS = (0.985, 1.085)  # max |theta| there
 
 
 @styled
@@ -23,23 +24,27 @@ def draw(data: Any) -> Any:
     """(a) the spectrum, (b) its superharmonic resonance, (c) errors over B, (d) errors over the work."""
     figure = new_figure(LOOK.double_column, 150.0)
     axes = figure.subplots(2, 2)
-    _draw_branches(axes[0, 0], data, SHOWN[:1])
+    _draw_branches(axes[0, 0], data, SHOWN[:1], apart=True)
     _draw_branches(axes[0, 1], data, SHOWN)
     _draw_settled(axes[0, 1], data["confirmed"])
     _draw_errors(axes[1, 0], data["features"])
     _draw_work(axes[1, 1], data["work"])
     axes[0, 0].set_xlim(*BOUNDS)
     axes[0, 0].set_ylim(bottom=0.0)
+    frame = (WINDOW[0], HEIGHTS[0], WINDOW[1] - WINDOW[0], HEIGHTS[1] - HEIGHTS[0])
+    axes[0, 0].indicate_inset(bounds=frame, edgecolor=LOOK.ink, alpha=1.0)
+    axes[0, 0].annotate("(b)", (WINDOW[0], HEIGHTS[1]), textcoords="offset points", xytext=(-4, 4), ha="center")
     axes[0, 1].set_xlim(*WINDOW)
-    axes[0, 1].set_ylim(0.985, 1.085)
+    axes[0, 1].set_ylim(*HEIGHTS)
     axes[0, 1].set_xticks([0.27, 0.275, 0.28, 0.285])
     for ax, label in zip(axes.flat, "abcd", strict=True):
         panel_label(ax, label)
     return figure
 
 
-def _draw_branches(ax: Any, data: Any, shown: tuple[float, ...]) -> None:
-    """The exact branch in the conventions of all spectra, and smoothed ones in shades, dashed where they are unstable."""
+def _draw_branches(ax: Any, data: Any, shown: tuple[float, ...], apart: bool = False) -> None:
+    """The exact branch in the conventions of all spectra, and smoothed ones in shades, dashed where they are unstable; the
+    special points of the superharmonic resonance, which lie on one another, are not drawn where it has a panel `apart`."""
     for name in ("exact", "broken"):
         _draw_branch(ax, data[name].to_dataset(), {"linewidth": 1.6, "zorder": 3}, "exact" if name == "exact" else None)
     for b in shown:
@@ -47,7 +52,10 @@ def _draw_branches(ax: Any, data: Any, shown: tuple[float, ...]) -> None:
         _draw_branch(ax, data[f"B{b:g}"].to_dataset(), look, rf"$\mathcal{{B}}={b:g}$")
     exact = data["exact"].to_dataset()
     for kind, marker in MARKERS.items():
-        here = exact["kind"].values == kind
+        place = exact["special_parameter"].values
+        here = (exact["kind"].values == kind) & ~(apart & (place > WINDOW[0]) & (place < WINDOW[1]))
+        if not here.any():
+            continue
         ax.plot(
             exact["special_parameter"].values[here], exact["special_amplitude"].values[here],
             linestyle="none", marker=marker, markersize=4.0, markerfacecolor="white", color=LOOK.ink, zorder=5,

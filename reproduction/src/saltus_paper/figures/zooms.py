@@ -10,6 +10,7 @@ from saltus import branches_of
 from saltus.plots import LOOK, draw_response, smooth_lines
 
 PLACES = 24  # the number of places along each side of the axes that are tried for an inset
+SHARES = (1.0, 0.9, 0.8, 0.75)  # of the size of an inset, which are tried
 MARGIN = 0.05  # the ticks of an inset take this share of the axes
 LINE = 5.0  # to cover a line is as bad as to cover so many points of a branch
 WEIGHT = 0.65  # lines that are drawn larger have this share of their width, as they lie closer together
@@ -58,7 +59,8 @@ def draw_beside(
 def free_place(
     ax: Any, spectrum: Any, size: tuple[float, float], quantity: str = "amplitude", scale: float = 1.0
 ) -> tuple[float, float, float, float]:
-    """Where in the axes an inset of a size (shares of the axes) covers least of the branches and lines."""
+    """Where in the axes an inset of a size (shares of the axes) covers least of the branches and lines; it is up to a
+    fourth smaller where it covers less then."""
     (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
     marks = [np.empty((0, 2))]
     for _, branch in branches_of(spectrum):
@@ -69,14 +71,16 @@ def free_place(
     lines = [(line.get_ydata()[0] - low) / (high - low) for line in ax.get_lines() if len(set(line.get_ydata())) == 1]
     table = spectrum["bands"]
     bands = (np.stack([table["low"].values, table["high"].values], axis=1) - left) / (right - left)
-    best, least = (0.1, 0.1), np.inf
-    for y in np.linspace(0.07, 0.96 - size[1], PLACES):
-        for x in np.linspace(0.07, 0.98 - size[0], PLACES):
-            inside = (np.abs(points - np.array([x + size[0] / 2, y + size[1] / 2])) < np.array(size) / 2 + margin).all(axis=1)
-            crossed = sum(y - margin < line < y + size[1] + 0.01 for line in lines)
-            hidden = int(((bands[:, 0] < x + size[0]) & (bands[:, 1] > x)).sum())
-            # It is better to cover a band than a branch or a line, and better to be high than low.
-            cost = inside.sum() + LINE * crossed + 0.5 * hidden - 1e-3 * y
-            if cost < least:
-                best, least = (x, y), cost
-    return (*best, *size)
+    best, least = (0.1, 0.1, *size), np.inf
+    for share in SHARES:
+        wide, tall = share * size[0], share * size[1]
+        for y in np.linspace(0.07, 0.96 - tall, PLACES):
+            for x in np.linspace(0.07, 0.98 - wide, PLACES):
+                inside = (np.abs(points - [x + wide / 2, y + tall / 2]) < [wide / 2 + margin, tall / 2 + margin]).all(axis=1)
+                crossed = sum(y - margin < line < y + tall + 0.01 for line in lines)
+                hidden = int(((bands[:, 0] < x + wide) & (bands[:, 1] > x)).sum())
+                # It is better to cover a band than a branch or a line, to be large, and to be high rather than low.
+                cost = inside.sum() + LINE * crossed + 0.5 * hidden + 2 * (1 - share) - 1e-3 * y
+                if cost < least:
+                    best, least = (x, y, wide, tall), cost
+    return best
