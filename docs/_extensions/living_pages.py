@@ -1,78 +1,12 @@
 """Pages that compute, in the pages of this site: each is made when the site is built, and stands beside it as a file."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 from docutils import nodes
 from docutils.parsers.rst import Directive
-
-import saltus
+from living_systems import PAGES, write
 
 FOLDER = "living"  # in the folder of the site
-
-
-def tristable():
-    """The metainterface of Fig. 4c: three stable states under a constant load, and the curves between their basins."""
-    beta0 = np.deg2rad(80)
-    system = saltus.System(model=saltus.Metainterface(beta0=beta0, damping=0.1), load=saltus.Load(vertical=-1.5 / np.sin(beta0)))
-    between = saltus.separatrices(system, window=((-2.4, 2.4), (-1.2, 1.2)), step=0.1)
-    return system, between, {"theta": 1.6, "duration": 70.0, "title": "Three stable states of the metainterface"}
-
-
-def spectrum():
-    """The response spectrum of Fig. 9b: its resonance, and the loops of the branch at low frequencies."""
-    system = saltus.System(
-        model=saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1),
-        load=saltus.Load(frequency=0.85, horizontal=saltus.Harmonic(amplitude=0.5), vertical=-0.5),
-    )
-    found = saltus.response_spectrum(system, "load.frequency", (0.1, 3.75), effort="quick", window=((-4.0, 4.0), (-4.0, 4.0)))
-    return system, [found], {"theta": 0.3, "periods": 40, "title": "A response spectrum and its orbits"}
-
-
-def block():
-    """A slender block under one sine of ground acceleration, which may overturn it."""
-    pulse = saltus.OneSine(amplitude=0.6, frequency=2.0, start=0.5, quantity="acceleration")
-    system = saltus.System(
-        model=saltus.RockingBlock(alpha=np.deg2rad(15)),
-        load=saltus.Load(ground_horizontal=pulse),
-        impact=saltus.VelocityReduction(e=0.9),
-    )
-    return system, [], {"theta": 0.0, "duration": 20.0, "title": "A rocking block under a pulse"}
-
-
-@saltus.register
-@dataclass(frozen=True, kw_only=True)
-class Bilinear(saltus.OneContactModel):
-    """An oscillator with one stiffness on each side of x = 0, the model of the page on pages."""
-
-    stiffness: float = 1.0
-    stop_stiffness: float = 9.0
-    damping: float = 0.05
-
-    coordinates = ("x",)
-    channels = ("force",)
-
-    def acceleration(self, t, x, velocity, side, load):
-        """x'' = F(t) - c x' - k x, k being that of the side."""
-        stiffness = 0.5 * ((1 + side) * self.stop_stiffness + (1 - side) * self.stiffness)
-        return load.force(t) - self.damping * velocity - stiffness * x
-
-
-def bilinear():
-    """A model of ten lines, with one branch of its resonance."""
-    system = saltus.System(model=Bilinear(), load=saltus.Load(frequency=1.3, force=saltus.Harmonic(amplitude=0.5)))
-    branch = saltus.continue_orbit(saltus.find_orbit(system, x=0.4), "load.frequency", (0.5, 2.5))
-    return system, [branch], {"x": 0.4, "periods": 30, "title": "An oscillator of one's own"}
-
-
-PAGES = {"tristable": tristable, "spectrum": spectrum, "block": block, "bilinear": bilinear}
-
-
-def write(name, folder):
-    """Make one of the pages, and write it into a folder."""
-    system, results, settings = PAGES[name]()
-    return saltus.page(system, *results, path=Path(folder) / f"{name}.html", **settings)
 
 
 class LivingPage(Directive):

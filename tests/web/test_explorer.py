@@ -23,9 +23,17 @@ SYSTEM = saltus.System(
 DAMPED = SYSTEM.with_({"model.damping": 0.2})
 
 
-@pytest.fixture
-def explorer():
+@pytest.fixture(scope="module")
+def made():
     return saltus.explore(SYSTEM, theta=0.3, velocity=0.1, periods=7)
+
+
+@pytest.fixture
+def explorer(made):
+    """An explorer as it was made."""
+    made.system, made.state = SYSTEM, {"theta": 0.3, "velocity": 0.1, "time": 0.0, "periods": 7}
+    yield made
+    made.widget.unobserve_all()
 
 
 def test_the_explorer_shows_the_system_and_the_motion_that_it_was_given(explorer):

@@ -49,10 +49,10 @@ def draw(data: Any) -> Any:
 
 
 def page(data: Any) -> LivingPage:
-    """The system of (c) with the curves between the basins of its three equilibria, and the first of its motions."""
-    system, (theta, velocity) = systems()["c"], STARTS["c"][-2]
+    """The system of (c) with the curves between the basins of its three equilibria, and a motion that comes near two of them."""
+    system = systems()["c"]
     between = separatrices(system, window=((-BOUND, BOUND), (-1.0, 1.0)), step=0.1)
-    return system, list(between), {"theta": theta, "velocity": velocity, "duration": DURATIONS["c"]}
+    return system, list(between), {"theta": 0.0, "velocity": 0.8, "duration": DURATIONS["c"]}
 
 
 def _corner_error(group: Any) -> float:
