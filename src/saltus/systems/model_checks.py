@@ -26,25 +26,29 @@ OFF_CONTACT = 1e-9  # the largest gap at the contact, relative to its rate, that
 PROBE = (0.37, 0.21, 0.13)  # time, coordinate and velocity at which a model's answers are counted: any numbers would do
 
 
-def check_works(model: Model) -> None:
+def check_works(model: Model) -> bool:
     """Refuse a model that cannot be simulated: parts of another class of models, parts that are missing or of the wrong size.
+
+    Returns whether contacts or surfaces of it are of sums of coordinates.
 
     Raises
     ------
     ParameterError
         The error names the class and what is wrong.
     """
+    sums = False
     if type(model) not in _known:
         _check_class(type(model))
     if isinstance(model, OneContactModel):
         check_one_contact(model)
     if isinstance(model, ContactModel):
-        check_contact_model(model)
+        sums = check_contact_model(model)
     if isinstance(model, InGapCoordinates):
         _check_moving_walls(model)
     if type(model) not in _known:
         _probe(model)
         _known.add(type(model))
+    return sums
 
 
 _known = set[type[Model]]()  # classes of which one model has passed, as systems are made by the thousand
@@ -116,8 +120,8 @@ def check_contact(model: OneContactModel, impact: ImpactLaw) -> None:
             )
 
 
-def check_contact_model(model: ContactModel) -> None:
-    """Refuse contacts and frictions that have no meaning.
+def check_contact_model(model: ContactModel) -> bool:
+    """Refuse contacts and frictions that have no meaning; returns whether there are sums of coordinates among them.
 
     Raises
     ------
@@ -148,12 +152,13 @@ def check_contact_model(model: ContactModel) -> None:
         for b in contacts:
             if a is not b and a.coordinate == b.coordinate and not (a.sign != b.sign and b.gap(a.position) > 0.0):
                 raise ParameterError(f"the contacts {a.name!r} and {b.name!r} leave {a.coordinate} no room between them", "model")
-    _check_frictions(model)
+    _check_frictions(model, [contact.coordinate for contact in contacts])
+    return any(not isinstance(part.coordinate, str) for part in parts)
 
 
-def _check_frictions(model: ContactModel) -> None:
+def _check_frictions(model: ContactModel, taken: list[Any]) -> None:
     """Refuse frictions on coordinates that they cannot hold, or with coefficients without meaning."""
-    kind, taken = type(model).__name__, [contact.coordinate for contact in model.contacts]
+    kind = type(model).__name__
     for friction in model.frictions:
         where = f"the friction {friction.name!r} of {kind}"
         if friction.coordinate not in model.coordinates:

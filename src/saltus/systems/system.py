@@ -52,6 +52,8 @@ class System:
     True
     """
 
+    _in_gaps = None  # this system in coordinates of its gaps, if it has others
+
     model: Model
     load: Load = field(default_factory=Load)
     impact: ImpactLaw = None  # type: ignore[assignment]  # until `__post_init__`, which knows the model
@@ -67,9 +69,11 @@ class System:
                     f"{type(self.model).__name__} does not read load.{channel}; {near(channel, known)}", f"load.{channel}"
                 )
         self.model.check_load(self.load)
-        check_works(self.model)
+        has_sums = check_works(self.model)
         _check_impact(self.model, self.impact)
-        _ = self.in_gap_coordinates  # refuses gaps that cannot be coordinates
+        if has_sums:  # refuses sums that cannot be coordinates
+            inner = System(model=in_gap_coordinates(self.model), load=self.load, impact=self.impact)
+            object.__setattr__(self, "_in_gaps", inner)
 
     def _repr_html_(self) -> str:
         parts = {name: type(getattr(self, name)).__name__ for name in ("model", "impact")}
@@ -133,8 +137,7 @@ class System:
         A sum of coordinates that a contact keeps on one side then is a coordinate, in the place of one of its terms: y_minus_x in
         the place of y. All other numbers are the same, under the same paths.
         """
-        model = in_gap_coordinates(self.model)
-        return self if model is self.model else System(model=model, load=self.load, impact=self.impact)
+        return self._in_gaps or self
 
     def from_gaps(self, time: Any, position: Any, velocity: Numbers) -> tuple[Any, Any]:
         """Coordinates and velocities of this system, for those of `in_gap_coordinates`; the same objects where that is itself.
@@ -146,10 +149,10 @@ class System:
         position, velocity
             A number or an array (n,) for each coordinate.
         """
-        model = in_gap_coordinates(self.model)
-        if model is self.model:
+        if self._in_gaps is None:
             return position, velocity
-        return model.own_states(time, position, velocity, self.load)  # type: ignore[no-any-return]
+        model: Any = self._in_gaps.model
+        return model.own_states(time, position, velocity, self.load)
 
     def to_gaps(self, time: Any, position: Any, velocity: Numbers) -> tuple[Any, Any]:
         """The inverse of `from_gaps`. Gaps of closed contacts, and their rates, are 0 if they are so up to rounding.
@@ -161,10 +164,10 @@ class System:
         position, velocity
             A number or an array (n,) for each coordinate.
         """
-        model = in_gap_coordinates(self.model)
-        if model is self.model:
+        if self._in_gaps is None:
             return position, velocity
-        return model.gap_states(time, position, velocity, self.load)  # type: ignore[no-any-return]
+        model: Any = self._in_gaps.model
+        return model.gap_states(time, position, velocity, self.load)
 
     def mirrored(self) -> System | None:
         """The system in which -theta(t) is a motion wherever theta(t) is one in this system; None without the symmetry.
