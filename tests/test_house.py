@@ -261,7 +261,7 @@ CEILINGS = {
     "files in the import closure of simulate": 61,
     "files that the architecture page names for a motion": 13,
     "isinstance of equations": 1,
-    "asking a model of which class it is": 23,
+    "asking a model of which class it is": 20,
     "arguments of a compiled function": 6,
     "public names behind doors": 441,
     "tuned numbers": 480,

@@ -8,7 +8,7 @@ from .contact_model import Surface as Surface
 from .contact_model import apart as apart
 from .contact_model import constrained_acceleration as constrained_acceleration
 from .contact_model import mass_and_force as mass_and_force
-from .contact_model import normal_forces as normal_forces
+from .contact_model import normal_limits as normal_limits
 from .contact_model import reactions as reactions
 from .contact_model import stick_margins as stick_margins
 from .drawings import Shape as Shape

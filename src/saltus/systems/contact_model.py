@@ -367,6 +367,12 @@ def normal_forces(model: Any, t: Any, q: Any, v: Any, load: Any) -> tuple[Any, .
     return tuple(given)
 
 
+def normal_limits(model: Model, t: Any, q: Any, v: Any, load: Any) -> dict[str, Any]:
+    """The normal force of each friction, by the name of the limit at which a motion ends where it vanishes."""
+    forces = normal_forces(model, t, q, v, load)
+    return {friction.limit: force for friction, force in zip(model.frictions, forces, strict=True)}
+
+
 def _lacking(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any) -> list[Any]:
     """M a - r, the force that must act on each coordinate besides r for these accelerations."""
     mass, force = mass_and_force(model, t, q, v, load)

@@ -15,7 +15,7 @@ from saltus.systems import (
     System,
     apart,
     constrained_acceleration,
-    normal_forces,
+    normal_limits,
     numbers,
     reactions,
     stick_margins,
@@ -342,8 +342,7 @@ def _trace_margins(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any, side: 
         return
     a = tuple(Expr("acceleration", (), i) for i in range(result.dof))
     margins = dict(ask(twin.model, "margins", t, q, v, a[0] if result.dof == 1 else a, side, twin.load))
-    forces = normal_forces(twin.model, t, q, v, twin.load)
-    margins |= {friction.limit: force for friction, force in zip(twin.model.frictions, forces, strict=True)}
+    margins |= normal_limits(twin.model, t, q, v, twin.load)
     for name in stop_at:
         if name not in margins:
             message = f"{type(twin.model).__name__} has no margin {name!r} to stop at; {near(name, margins)}"

@@ -78,7 +78,7 @@ class ContactsEquations(OrbitEquations):
     @classmethod
     def read(cls, base: OrbitEquations, motion: MotionToRead) -> tuple[OrbitEquations, np.ndarray] | None:
         """None with frictions or with accumulations of impacts, for which there are no equations from event to event."""
-        known = base.system.contact_model if cls.solves(base.system, base.signature) else None
+        known = base.system.contact_model if isinstance(base, cls) else None
         if known is None or known.frictions or known.surfaces:
             return None
         if motion.twice.limit is not None or len(motion.twice.events.of(EventKind.HELD)):

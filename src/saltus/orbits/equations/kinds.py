@@ -9,8 +9,9 @@ from saltus.orbits.equations.whole_motion import WholeMotionEquations
 from saltus.orbits.signature import Signature
 from saltus.systems import System
 
-# The kinds, in the order in which a motion is read with them: the first admissible orbit is taken.
-KINDS: list[type[OrbitEquations]] = [OneContactEquations, ContactsEquations, WholeMotionEquations]
+# The kinds, in the order in which a motion is read with them: the first admissible orbit is taken. The equations from impact to
+# impact are those of all systems that have no others.
+KINDS: list[type[OrbitEquations]] = [ContactsEquations, OneContactEquations, WholeMotionEquations]
 
 
 def equations_of(

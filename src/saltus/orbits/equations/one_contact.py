@@ -55,11 +55,11 @@ class OneContactEquations(OrbitEquations):
 
     @classmethod
     def solves(cls, system: System, signature: Signature) -> bool:
-        return signature.section is None and not system.model.holds_coordinates
+        return signature.section is None
 
     @classmethod
     def read(cls, base: OrbitEquations, motion: MotionToRead) -> tuple[OrbitEquations, np.ndarray] | None:
-        if not cls.solves(base.system, base.signature):
+        if not isinstance(base, cls):
             return None
         once, periods = motion.once, motion.periods
         if once.side == 0 or len(once.events.of(EventKind.REST)) or not once.phase_known:

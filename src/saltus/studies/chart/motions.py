@@ -87,7 +87,7 @@ def motions_later(
         tol=tol,
     )
     ahead, period = ends.last, np.zeros(len(ends), dtype=int)
-    if not system.model.holds_coordinates:  # else an extrapolated state may lie beyond a contact
+    if system.model.has_state_plane:  # else an extrapolated state may lie beyond a contact
         ahead, period = approached(ends.states, max_period)
     if slow:
         own = len(system.model.coordinates)
