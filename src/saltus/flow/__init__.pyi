@@ -2,7 +2,6 @@ from .contacts.layout import SegmentEnd as SegmentEnd
 from .contacts.layout import SegmentExtremes as SegmentExtremes
 from .contacts.layout import SegmentPlan as SegmentPlan
 from .kernel.compiled import Program as Program
-from .kernel.compiled import limits_of as limits_of
 from .kernel.compiled import program as program
 from .kernel.layout import EventCode as EventCode
 from .kernel.layout import SegmentColumn as SegmentColumn
@@ -40,7 +39,6 @@ from .motion.events import Impacts as Impacts
 from .motion.events import Stop as Stop
 from .motion.events import modes_of as modes_of
 from .motion.motion import Motion as Motion
-from .motion.motion import rate_name as rate_name
 from .motion.motion import state_names as state_names
 from .motion.portable import PortableKernel as PortableKernel
 from .motion.portable import PortableMotion as PortableMotion

@@ -13,7 +13,7 @@ import numpy as np
 
 from saltus.checks import check_axis, check_count, check_number, checked_by
 from saltus.errors import MotionError, ParameterError, shown
-from saltus.flow import Ending, Motion, Recurrence, captured_between, find_recurrence, rate_name, simulate
+from saltus.flow import Ending, Motion, Recurrence, captured_between, find_recurrence, simulate, state_names
 from saltus.progress import Progress, silent
 from saltus.result import provenance
 from saltus.systems import System, arguments_of, check_along, check_path, check_system, read_start
@@ -331,7 +331,7 @@ def _dataset(asked: SweepRequest, runs: tuple[_OneWay, _OneWay], jumps: list[tup
         "period": (lambda row: row.period[0], "1", "forcing periods after which it repeats itself; 0 where it does not"),
         "periods": (lambda row: row.periods[0], "1", "forcing periods that it was followed"),
     }
-    for i, state in enumerate([*names, *(rate_name(each, names) for each in names)]):
+    for i, state in enumerate(state_names(names)):
         columns[state] = (partial(_state_of, i), model.unit_of(names[i % len(names)]), f"{state} at phase 0")
     table = {key: np.full((2, count), np.nan) for key in columns}
     outcome = np.full((2, count), "", dtype="<U8")

@@ -88,7 +88,6 @@ from .states import states_beside as states_beside
 from .states import within_window as within_window
 from .system import System as System
 from .system import check_system as check_system
-from .system import contact_images as contact_images
 from .system import image_of as image_of
 from .two_layer import TwoLayer as TwoLayer
 from .unit_cell import UnitCell as UnitCell

@@ -183,12 +183,17 @@ class System:
         load, inner = self.model.mirror(self.load), self.in_gap_coordinates
         if inner is not self:
             return None if inner.mirrored() is None else System(model=self.model, load=load, impact=self.impact)
-        if load is None or contact_images(self.model, self.impact) is None:
+        if load is None or self.contact_images is None:
             return None
         mirrored = System(model=self.model, load=load, impact=self.impact)
         for side in self.model.every_side:
             check_mirror(self, mirrored, side)
         return mirrored
+
+    @property
+    def contact_images(self) -> tuple[int, ...] | None:
+        """The number of the mirror image of each contact, then of each friction; None if one has no image or the laws differ."""
+        return _contact_images(self.model, self.impact)
 
     @property
     def one_contact(self) -> OneContactModel:
@@ -374,7 +379,7 @@ def image_of(model: Model, states: np.ndarray) -> np.ndarray:
     return np.asarray(-states[..., [*places, *(n + place for place in places)]])
 
 
-def contact_images(model: Model, impact: ImpactLaw) -> tuple[int, ...] | None:
+def _contact_images(model: Model, impact: ImpactLaw) -> tuple[int, ...] | None:
     """The index of the mirror image of each contact, then of each friction; None if one has no image or the laws differ."""
     if model.surfaces:
         return None  # those of surfaces are not looked for

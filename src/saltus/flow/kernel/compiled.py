@@ -364,9 +364,10 @@ class Program:
         return replace(self, env=env, model=model)
 
 
-def program(system: System, limits: tuple[str, ...] = (), sensitivities: tuple[str, ...] | None = None) -> Program:
-    """A system ready to run, with a tangent if asked for. Its structure is traced and compiled unless it is known; its numbers
-    are only filled in."""
+def program(system: System, limits: tuple[str, ...] | None = None, sensitivities: tuple[str, ...] | None = None) -> Program:
+    """A system ready to run, by default with the margins that end a motion in any case, and with a tangent if asked for. Its
+    structure is traced and compiled unless it is known; its numbers are only filled in."""
+    limits = limits_of(system, ()) if limits is None else limits
     key = (structure_key(system), limits, sensitivities)
     if key not in _structures:
         traced = trace(system, limits, sensitivities)

@@ -20,7 +20,6 @@ from saltus.flow.kernel.compiled import (
     MOST_COEFFICIENTS,
     contacts_text,
     edges_function,
-    limits_of,
     margins_function,
     one_contact_text,
     program,
@@ -79,7 +78,7 @@ class PortableMotion:
     """What another processor needs to follow the motions of a system, with any numbers."""
 
     def __init__(self, system: System) -> None:
-        self.system, self.run = system, program(system, limits_of(system, ()))
+        self.system, self.run = system, program(system)
         self.kernel = PortableKernel(self.run.trace.several)
 
         once = {path: part_at(system, path) for path, _ in self.run.trace.records}

@@ -15,7 +15,7 @@ from saltus.continuation import Bounds, Cut, End, TestFunction, Zero
 from saltus.errors import ParameterError
 from saltus.flow import Motion, SegmentFollower, program, simulate
 from saltus.orbits.signature import Signature
-from saltus.systems import System, contact_images, numbers
+from saltus.systems import System, numbers
 from saltus.taylor import FREQUENCY, record_table
 
 FARTHEST = 1.0  # upper limit of distances of an orbit from a change, which are infinite where nothing comes near to one
@@ -377,7 +377,7 @@ class OrbitEquations(ABC):
     @cached_property
     def images(self) -> tuple[int, ...]:
         """The number of the mirror image of each contact and friction; none where there is no such symmetry."""
-        return contact_images(self.system.model, self.system.impact) or ()
+        return self.system.contact_images or ()
 
     @cached_property
     def halved(self) -> Self:

@@ -26,7 +26,6 @@ from saltus.flow import (
     Sensitivities,
     Stop,
     derivatives_of,
-    limits_of,
     program,
     state_rates,
 )
@@ -253,7 +252,7 @@ class WholeMotionEquations(OrbitEquations):
 
     @cached_property
     def _program(self) -> Program:
-        return program(self.system, limits_of(self.system, ()), self.paths)
+        return program(self.system, sensitivities=self.paths)
 
     def _followed(self, system: System, state: np.ndarray, time: float, values: np.ndarray) -> Sensitivities:
         """The motion over the time that the equations cover, with its derivatives."""
