@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.attractors.stroboscopic_section import certify, check_periodic
-from saltus.bounds import area_contraction, enclose, leaves_over_a_period, on_side
+from saltus.bounds import area_contraction, largest_pushes
 from saltus.checks import Numbers, check_count, check_size
 from saltus.errors import ParameterError
 from saltus.flow import ContactRegularity, contact_regularity, find_recurrence
@@ -198,10 +198,10 @@ def _continuous(system: System) -> str | None:
     if contact_regularity(traced, tuple(system.parameters.values())) is ContactRegularity.CONTINUOUS:
         return "neither the velocity nor the acceleration changes at the contact"
     assert traced.contact_acceleration is not None
-    pushes = enclose([on_side(s, traced.contact_acceleration) for s in (1, -1)], leaves_over_a_period(system))
-    if not np.all(np.minimum(*(push.hi for push in pushes)) < 0.0):
+    pushes = largest_pushes(system, traced.contact_acceleration)
+    if not np.all(np.minimum(*pushes) < 0.0):
         return None
-    if np.all(np.maximum(*(push.hi for push in pushes)) < 0.0):
+    if np.all(np.maximum(*pushes) < 0.0):
         return "the load presses on the contact from both sides at all times"
     return "the load never pushes away from the contact on both sides at once"
 

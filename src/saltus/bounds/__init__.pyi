@@ -2,8 +2,7 @@ from .capture import capture_speed as capture_speed
 from .capture import keeps_rest as keeps_rest
 from .capture import proved_speeds as proved_speeds
 from .contraction import area_contraction as area_contraction
-from .contraction import leaves_over_a_period as leaves_over_a_period
-from .contraction import on_side as on_side
+from .contraction import largest_pushes as largest_pushes
 from .gap_equation import Leaves as Leaves
 from .gap_equation import reads as reads
 from .intervals import Interval as Interval

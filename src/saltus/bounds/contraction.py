@@ -25,19 +25,24 @@ def area_contraction(system: System) -> float | None:
     if not system.model.has_state_plane:
         return None
     traced = trace(system)
-    leaves = leaves_over_a_period(system)
-    slopes = [on_side(s, differentiate(traced.acceleration[0], VELOCITY)) for s in _sides(traced)]
+    leaves = _leaves_over_a_period(system)
+    slopes = [_on_side(s, differentiate(traced.acceleration[0], VELOCITY)) for s in _sides(traced)]
     anywhere = Leaves(leaves.parameters, [EVERYWHERE] * len(traced.records), leaves.time, EVERYWHERE, EVERYWHERE)
     least = min(float(np.min(-bounds.hi)) for bounds in enclose(slopes, anywhere))
     return least + 0.0 if least >= 0.0 and _loses(traced, leaves) else None
 
 
-def leaves_over_a_period(system: System) -> Leaves:
+def largest_pushes(system: System, acceleration: Expr) -> list[np.ndarray]:
+    """Upper bounds of an acceleration at the contact on the sides +1 and -1, in cells over a forcing period."""
+    return [bounds.hi for bounds in enclose([_on_side(side, acceleration) for side in (1, -1)], _leaves_over_a_period(system))]
+
+
+def _leaves_over_a_period(system: System) -> Leaves:
     """The numbers of a system, and the time in cells over its forcing period, as the leaves of its trace."""
     return Leaves([Interval(value) for value in system.parameters.values()], [], time=_cells(system))
 
 
-def on_side(side: int, root: Expr) -> Expr:
+def _on_side(side: int, root: Expr) -> Expr:
     """An expression on one side."""
     return substitute(root, {Expr("side"): float(side)})
 
@@ -59,7 +64,7 @@ def _loses(traced: Trace, leaves: Leaves) -> bool:
     if traced.velocity_after is None:
         return True
     for side in _sides(traced):
-        after = on_side(side, traced.velocity_after)
+        after = _on_side(side, traced.velocity_after)
         slope = differentiate(after, VELOCITY)
         if reads(slope, "velocity", "time", "record"):
             return False

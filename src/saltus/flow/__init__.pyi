@@ -21,7 +21,6 @@ from .lanes.threads import share_cores as share_cores
 from .long_time.load_release import Release as Release
 from .long_time.load_release import contact_pull as contact_pull
 from .long_time.load_release import load_releases as load_releases
-from .long_time.load_release import peak_near as peak_near
 from .long_time.recurrence import RECURRENCE as RECURRENCE
 from .long_time.recurrence import Ending as Ending
 from .long_time.recurrence import Recurrence as Recurrence

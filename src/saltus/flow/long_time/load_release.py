@@ -39,6 +39,21 @@ class Release:
     side: int
     peak: float
 
+    def peak_near(self, system: System, phase: float) -> float:
+        """The first peak of the contact acceleration on its side after a phase of the load, even if it does not pull there.
+
+        Parameters
+        ----------
+        system
+            The system, or one with other numbers.
+        phase
+            The phase of the load, rad.
+        """
+        period = system.load.period
+        assert period is not None
+        after = [((2.0 * np.pi * t / period - phase) % (2.0 * np.pi), value) for t, value in _peaks(system, self.side)]
+        return min(after)[1] if after else float("-inf")
+
 
 def contact_pull(system: System, side: int) -> Callable[[Any], Any]:
     """The second derivative of the gap of a system at rest at the contact, on a side, as a function of time.
@@ -89,15 +104,6 @@ def load_releases(system: System) -> tuple[Release, ...]:
     sides = system.model.sides or range(1, 1 + len(system.model.contacts))
     found = [release for side in sides for release in _of_side(system, side)]
     return tuple(sorted(found, key=lambda release: release.time))
-
-
-def peak_near(system: System, side: int, phase: float) -> float:
-    """The first peak of the contact acceleration on a side after a phase of the load, even if it does not pull there."""
-    period = system.load.period
-    assert period is not None
-    peaks = _peaks(system, side)
-    after = [((2.0 * np.pi * t / period - phase) % (2.0 * np.pi), value) for t, value in peaks]
-    return min(after)[1] if after else float("-inf")
 
 
 def _grid(system: System) -> np.ndarray:

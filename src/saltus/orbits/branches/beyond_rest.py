@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from saltus.continuation import End, Evidence
-from saltus.flow import load_releases, peak_near
+from saltus.flow import load_releases
 from saltus.orbits.branches.orbit_curve import OrbitPoint
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint
 from saltus.orbits.equations.contract import Restart
@@ -54,7 +54,7 @@ def last_release(point: OrbitPoint) -> SpecialPoint | None:
     def pull(at: float) -> float:
         """The least of the peaks of the pull after these releases, with the parameter at a value."""
         system, turns = equations.system_at(np.array([at])), [(release, release.time * orbit.frequency) for release in known]
-        return min(peak_near(system, release.side, phase - SETTINGS.behind) for release, phase in turns)
+        return min(release.peak_near(system, phase - SETTINGS.behind) for release, phase in turns)
 
     reach, before = SETTINGS.nearest_loss * point.curve.scales[0], pull(value)
     for _ in range(SETTINGS.doublings):
