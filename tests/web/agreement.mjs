@@ -14,7 +14,7 @@ for (const { wasm, description, motions } of tasks) {
       const { stop, reason, end, time } = motion;
       const events = motion.events.map((event) => [event.time, event.kind, event.contact, event.before, event.after]);
       const energies = at.map((t) => motion.energy(t));
-      return { stop, reason, end: [...end], last: time.last, events, states: at.map((t) => [...motion.state(t)]), energies, validity: motion.validity };
+      return { stop, reason, end: [...end], last: time.last, events, states: at.map((t) => [...motion.state(t)]), energies, validity: motion.validity, drawings: at.map((t) => engine.drawing(motion.system, motion.state(t), t)) };
     }),
   );
 }

@@ -10,6 +10,7 @@ import base64
 import json
 import shutil
 import subprocess
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -201,6 +202,51 @@ def check(seed, each, kinds, folder):
                 whole += 1
                 check_whole(system, motion, beside, other)
     return counts, whole
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pendulum(saltus.OneContactModel):
+    """A pendulum at a wall, with a drawing of its own."""
+
+    length: float = 1.0
+    wall: float = -0.3
+
+    coordinates = ("phi",)
+    channels = ("torque",)
+    sides = (1,)
+
+    @property
+    def contact(self):
+        return self.wall
+
+    def acceleration(self, t, phi, velocity, side, load):
+        return load.torque(t) - 0.05 * velocity - np.sin(phi) / self.length
+
+    def gap(self, phi, side):
+        return phi - self.wall
+
+    def reset(self, t, velocity, side, load, impact):
+        return side, -impact.velocity_after(self, t, velocity, side, side, load)
+
+    def drawing(self, position):
+        bob = [self.length * np.sin(position[0]), -self.length * np.cos(position[0])]
+        bar = saltus.systems.Shape("line", np.array([[0.0, 0.0], bob]), "bar")
+        return [bar, saltus.systems.Shape("circle", np.array([bob]), "mass", 0.1 * self.length)]
+
+
+def test_a_drawing_of_the_models_own_is_traced_with_all_of_its_numbers(tmp_path):
+    load = Load(frequency=0.8, torque=Harmonic(0.3))
+    system = System(model=Pendulum(), load=load, impact=saltus.VelocityReduction(0.8))
+    longer = system.with_({"model.length": 1.7})
+    wasm, description = page_parts(system)
+    motion = {"values": longer.parameters, "start": {"phi": 0.4}, "periods": 3, "at": AT}
+    ((found,),) = in_node([{"wasm": wasm, "description": description, "motions": [motion]}], tmp_path)
+    for state, drawing in zip(found["states"], found["drawings"], strict=True):
+        known = saltus.systems.drawing_of(longer, state[:1])
+        assert [(shape["kind"], shape["role"]) for shape in drawing] == [(shape.kind, shape.role) for shape in known]
+        for shape, one in zip(drawing, known, strict=True):
+            np.testing.assert_allclose(shape["points"], one.points, atol=1e-15)
+        assert drawing[1]["radius"] == known[1].radius == 0.1 * 1.7
 
 
 def test_motions_of_the_page_are_those_of_python(tmp_path):

@@ -33,8 +33,10 @@ def page_parts(system: System) -> tuple[bytes, dict[str, Any]]:
     several = motion.kernel.several
     called = [argument["name"] for argument in motion.kernel.arguments if argument["kind"] == "function"]
     objects = [kernel_object(several), structure_object(motion.functions())]
-    linked = link(objects, (*EXPORTED, "matrices" if several else "geometry"), called)
-    engine = motion.layout() | {"pointers": linked.table, "heap": linked.heap}
+    layout = motion.layout()
+    own = ["drawing"] if layout["drawing"] else []
+    linked = link(objects, (*EXPORTED, "matrices" if several else "geometry", *own), called)
+    engine = layout | {"pointers": linked.table, "heap": linked.heap}
     return linked.content, description(motion) | {"engine": engine}
 
 

@@ -337,9 +337,13 @@ def margins_function(traced: Trace, names: Sequence[str]) -> WrittenFunction:
     the coordinates."""
     rates = [(op, k, i) for k, op in ((1, "velocity"), (2, "acceleration")) for i in range(traced.dof)]
     behind = {Expr(op, (), i): Expr("coordinate", (), k * traced.dof + i) for op, k, i in rates}
-    roots = [substitute(traced.margins[name], behind) for name in names]
+    return values_function("margins", [substitute(traced.margins[name], behind) for name in names])
+
+
+def values_function(name: str, roots: list[Expr]) -> WrittenFunction:
+    """A function of the state that fills its last argument with the values of expressions."""
     places = Places(("t", "origin", "side", "env", "piece", "state", "out"), LEAVES | HERE)
-    return _function("margins", places, [Case(tape(roots, {}), [("out", i) for i in range(len(roots))])])
+    return _function(name, places, [Case(tape(roots, {}), [("out", i) for i in range(len(roots))])])
 
 
 def _table(name: str, places: Places, roots: list[Expr], known: dict[Expr, int]) -> WrittenFunction:

@@ -24,13 +24,14 @@ from saltus.flow.kernel.compiled import (
     one_contact_text,
     program,
     structure_functions,
+    values_function,
 )
 from saltus.flow.kernel.layout import EventCode, Geometry, Mode, Status
 from saltus.flow.kernel.memory import ADVANCE, ADVANCE_CONTACTS, MOTION, SIZES
 from saltus.flow.motion.events import EventKind, Stop
 from saltus.flow.motion.simulate import refusal
 from saltus.systems import Pulse, System, children, substitute
-from saltus.taylor import RECORD_WIDTH, Expr, Trace, WrittenFunction, record_table, trace
+from saltus.taylor import RECORD_WIDTH, Expr, Trace, WrittenFunction, combine, record_table, trace
 from saltus.taylor.load_tables import AFTER, SINCE, WITHIN
 
 ENUMERATIONS = (Mode, Status, EventCode, Geometry, ContactColumn, FrictionColumn)
@@ -86,11 +87,34 @@ class PortableMotion:
 
     def functions(self) -> list[WrittenFunction]:
         """The functions of the structure, which the kernel calls, and `edges`, when each pulse of the load begins and ends."""
-        places = count()
-        twin = substitute(self.system, lambda path, value: Expr("parameter", (), next(places)))
-        pulses = [part_at(twin, path) for path in self._pulses]
+        pulses = [part_at(self._twin, path) for path in self._pulses]
         edges = edges_function([t for p in pulses for t in (p.start, p.start + p.length)])
-        return [*structure_functions(self.run.trace), edges, margins_function(*self._evaluated[:2])]
+        drawn = [values_function("drawing", self._drawn[1])] if self._drawn[1] else []
+        return [*structure_functions(self.run.trace), edges, margins_function(*self._evaluated[:2]), *drawn]
+
+    @cached_property
+    def _twin(self) -> System:
+        """The system with symbols in the places of its numbers."""
+        places = count()
+        return substitute(self.system, lambda path, value: Expr("parameter", (), next(places)))
+
+    @cached_property
+    def _drawn(self) -> tuple[list[dict[str, Any]], list[Expr]]:
+        """The shapes of the model's own drawing, and their points and radii as expressions of the coordinates and the numbers.
+
+        Nothing of a model without one, or with one that cannot be traced, as it compares or needs plain numbers.
+        """
+        draw: Any = getattr(self._twin.model, "drawing", None)
+        if draw is None:
+            return [], []
+        place = np.array([Expr("coordinate", (), i) for i in range(self.run.trace.dof)], dtype=object)
+        try:
+            shapes = [(shape, np.asarray(shape.points, dtype=object).reshape(-1, 2)) for shape in draw(place)]
+        except (SaltusError, ArithmeticError, AttributeError, TypeError, ValueError):
+            return [], []
+        parts = [{"kind": shape.kind, "role": shape.role, "points": len(points)} for shape, points in shapes]
+        values = [value for shape, points in shapes for value in (*points.ravel(), shape.radius)]
+        return parts, [combine("add", value, 0.0) for value in values]
 
     @cached_property
     def _evaluated(self) -> tuple[Trace, tuple[str, ...], bool]:
@@ -131,6 +155,7 @@ class PortableMotion:
             "records": self._records(),
             "margins": list(self._evaluated[1]),
             "energy": self._evaluated[2],
+            "drawing": self._drawn[0],
             "event_kinds": [str(kind) for kind in EventKind],
             "refusals": {
                 int(status): text for status in Status if (text := refusal(self.system, status, "{time}", "{velocity}"))

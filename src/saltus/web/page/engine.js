@@ -22,6 +22,7 @@ import { BUFFER, Refusal, Run } from "./run.js";
  * @property {number} positions_at @property {number} grounds_at @property {number} contact_numbers
  * @property {string[]} limits @property {import("./load_table.js").Records} records
  * @property {string[]} margins  What can be evaluated along a motion; the kinetic energy is the last with `energy`.
+ * @property {{kind: string, role: string, points: number}[]} drawing  The shapes of the model's own drawing.
  * @property {boolean} energy @property {string[]} event_kinds
  * @property {Record<number, string>} refusals @property {Record<number, string>} stops @property {Record<string, string>} stop_meanings
  * @property {Record<string, number>} pointers @property {number} heap
@@ -36,6 +37,7 @@ import { BUFFER, Refusal, Run } from "./run.js";
  * @property {(request: number) => number} advance @property {(top: number) => void} rewind
  * @property {(parameters: number, out: number) => void} constants @property {(parameters: number, out: number) => void} edges
  * @property {(...all: any[]) => void} geometry @property {(...all: any[]) => void} matrices @property {(...all: any[]) => void} margins
+ * @property {(...all: any[]) => void} [drawing]
  */
 
 /** @param {Uint8Array | ArrayBuffer} wasm @param {EngineDescription} description */
@@ -206,13 +208,32 @@ export class Engine {
    * @param {PageSystem} system @param {number} time @param {number} side @param {ArrayLike<number>} state
    */
   evaluated(system, time, side, state) {
+    return this.called(this.exports.margins, system, time, side, state, this.layout.margins.length);
+  }
+
+  /** The model's own drawing in a state, or null where it has none. @param {PageSystem} system @param {ArrayLike<number>} state @param {number} time */
+  drawing(system, state, time) {
+    const { drawing } = this.exports;
+    if (!drawing) return null;
+    const count = this.layout.drawing.reduce((sum, { points }) => sum + 2 * points + 1, 0);
+    const values = Array.from(this.called(drawing, system, time, 1, state, count));
+    let at = 0;
+    return this.layout.drawing.map(({ kind, role, points }) => {
+      const places = Array.from({ length: points }, (_, i) => values.slice(at + 2 * i, at + 2 * i + 2));
+      at += 2 * points + 1;
+      return { kind, role, points: places, radius: values[at - 1] ?? 0 };
+    });
+  }
+
+  /** @param {Function} call @param {PageSystem} system @param {number} time @param {number} side @param {ArrayLike<number>} state @param {number} count */
+  called(call, system, time, side, state, count) {
     this.place(system);
     this.doubles(this.scratch, state.length).set(state);
     const length = system.period ?? 0;
     const [period, local] = length ? divmod(time, length) : [0, time];
     const piece = BigInt(placeAbove(system.breaks, time));
-    this.exports.margins(local, period * length, side, ...this.environment(system), piece, this.scratch, this.results);
-    return this.doubles(this.results, this.layout.margins.length);
+    call(local, period * length, side, ...this.environment(system), piece, this.scratch, this.results);
+    return this.doubles(this.results, count);
   }
 
   /**

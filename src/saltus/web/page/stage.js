@@ -8,6 +8,7 @@ import { rangeOf, shortly } from "./numbers.js";
 /** @typedef {import("./palette.js").Palette} Palette */
 /** @typedef {[number, number, number, number]} Box */
 
+const OWN_STATES = 60; // of a motion, around which the picture of a model's own drawing is laid
 const FLASH_TIME = 0.22; // seconds of the reader for which an impact is seen
 
 /** @typedef {{fill?: string, stroke?: string, width?: number, dash?: number[]}} Ink */
@@ -36,6 +37,8 @@ export class Stage {
     this.note = "";
     /** @type {number[]} */
     this.reach = [];
+    /** @type {Box|null} */
+    this.ownBox = null;
     this.spoken = 0;
     this.size = sizeOf(host);
     new ResizeObserver(() => {
@@ -50,6 +53,17 @@ export class Stage {
       const range = rangeOf([this.session.column(name)]);
       return range ? Math.max(Math.abs(range.low), Math.abs(range.high)) : 1;
     });
+    this.ownBox = this.boxOfOwn();
+  }
+
+  /** Around the model's own drawing, wherever the motion goes. @returns {Box|null} */
+  boxOfOwn() {
+    const { engine, system, motion } = this.session;
+    if (!system || !motion) return null;
+    const { first, last } = motion.time;
+    const times = Array.from({ length: OWN_STATES }, (_, i) => first + ((last - first) * i) / (OWN_STATES - 1));
+    const shapes = times.flatMap((time) => engine.drawing?.(system, motion.state(time), time) ?? []);
+    return shapes.length ? boxOf(shapes) : null;
   }
 
   /** The impact that is flashing at a time, and how strongly: 1 at the impact, then fading. @param {number} time */
@@ -105,7 +119,7 @@ export class Stage {
     const state = session.stateAt(time);
     if (!state || !system) return null;
     const own = engine.drawing?.(system, state, time);
-    if (own?.length) return { shapes: own, box: boxOf(own) };
+    if (own?.length) return { shapes: own, box: this.ownBox ?? boxOf(own) };
     const channels = [...new Set(description.load.map((entry) => entry.channel))];
     const load = (/** @type {string} */ channel) => (channels.includes(channel) ? session.load(channel, time) : 0);
     const scene = { values: session.store.state.values, state, time, reach: this.reach, load, channels };

@@ -12,7 +12,7 @@ import { asText, symbolOf } from "./symbols.js";
 
 const NEAR = 12; // pixels from which a click or the cursor takes hold of a point
 const PER_PIXEL = 3; // samples of a curve over time
-const OVERVIEW = 300; // samples of the energy from which its range is taken
+const OVERVIEW = 900; // samples of the energy over what is seen
 const TIME = ["time ", symbolOf("tau")];
 
 /** @param {Session} session */
@@ -271,7 +271,13 @@ export function energyView(session, show) {
     const found = times.map((time) => energy?.call(session.motion, time) ?? NaN);
     return { times, found };
   };
-  const whole = () => (session.motion ? over(session.motion.time.first, session.motion.time.last, OVERVIEW) : null);
+  /** @type {{motion: import("./types.js").Motion|null, all: ReturnType<typeof over>|null}} */
+  let kept = { motion: null, all: null };
+  const whole = () => {
+    const { motion } = session;
+    if (motion !== kept.motion) kept = { motion, all: motion && over(motion.time.first, motion.time.last, OVERVIEW) };
+    return kept.all;
+  };
   return {
     id: "energy", title: "Kinetic energy", instructions: "A click shows that time.",
     axes: () => ({ x: { name: TIME }, y: { name: ["kinetic energy ", symbolOf("T")], low: undefined } }),
@@ -285,7 +291,8 @@ export function energyView(session, show) {
       if (!motion) return;
       const from = clamp(painter.window[0], motion.time.first, motion.time.last);
       const to = clamp(painter.window[1], motion.time.first, motion.time.last);
-      const { times, found } = over(from, to, Math.round(painter.box.width));
+      const all = from === motion.time.first && to === motion.time.last ? whole() : null;
+      const { times, found } = all ?? over(from, to, OVERVIEW);
       painter.curve(times, found, { color: painter.palette.stable, width: 1.2 });
       strokesOfImpacts(session, painter);
     },
