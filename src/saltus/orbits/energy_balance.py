@@ -207,7 +207,7 @@ def energies(of: Followed, *, periods: int | None = None) -> xarray.Dataset:
     ------
     ParameterError
         The motion was not kept densely or is too short; or the model gives neither its kinetic energy nor its mass
-        matrix.
+        matrix; or walls that move do work at its contacts.
 
     Examples
     --------
@@ -218,6 +218,7 @@ def energies(of: Followed, *, periods: int | None = None) -> xarray.Dataset:
     True
     """
     course = course_of(of, periods)
+    _refuse_moving_walls(course.system)
     parts = _parts(course)
     roles, names = zip(*parts, strict=True)
     energy = np.array(list(parts.values()))
@@ -229,6 +230,17 @@ def energies(of: Followed, *, periods: int | None = None) -> xarray.Dataset:
     }
     facts = {"duration": course.length, "defect": float(np.sum(signs * energy))}
     return result_dataset("energies", columns, {"part": list(names)}, course.system, tol=course.motion.tol, **facts)
+
+
+def _refuse_moving_walls(system: System) -> None:
+    """Refuse motions on which walls that move do work, in the coordinates in which they do."""
+    inner: Any = system.in_gap_coordinates
+    if inner is not system and any(inner.model.sums()[1]):
+        raise ParameterError(
+            "walls that move do work at contacts, which is not told apart: give a motion of system.in_gap_coordinates, whose "
+            "energies are relative to the ground",
+            "of",
+        )
 
 
 @answered
