@@ -155,3 +155,35 @@ test("a window is never narrower than its numbers can tell", () => {
   assert.ok(!wideEnough([0, NaN, 0, 1]));
   assert.ok(!wideEnough([0, 1, 0, 1e200]));
 });
+
+test("the view of a notebook tells the page and the model of one another, and listens to its own frame alone", async () => {
+  const { default: view } = await import("../../src/saltus/web/page/notebook.js");
+  const [sent, listeners] = [[], new Set()];
+  const frame = { style: {}, setAttribute() {}, remove() { frame.gone = true; }, contentWindow: { postMessage: (message) => sent.push(message.saltus) } };
+  const traits = { title: "A wall", page: "<p></p>", height: 500, values: { "model.damping": 0.1 }, start: { time: 0, x: 1 }, periods: 5, results: [1] };
+  const changes = {};
+  let saved = 0;
+  const model = {
+    get: (name) => traits[name], set: (name, value) => (traits[name] = value), save_changes: () => saved++,
+    on: (name, act) => (changes[name] = act), off: (name) => delete changes[name],
+  };
+  const says = (message, source = frame.contentWindow) => listeners.forEach((heard) => heard({ source, data: message }));
+  Object.assign(globalThis, {
+    document: { createElement: () => frame }, getComputedStyle: () => ({ color: "rgb(230, 230, 230)" }),
+    addEventListener: (_, act) => listeners.add(act), removeEventListener: (_, act) => listeners.delete(act),
+  });
+  const end = view.render({ model, el: { append() {} } });
+  assert.equal(frame.srcdoc, "<p></p>");
+  says({ saltus: { ready: true } });
+  assert.deepEqual(sent.pop(), { values: { "model.damping": 0.1 }, start: { time: 0, x: 1 }, periods: 5, results: [1], theme: "dark" });
+  says({ saltus: { values: { "model.damping": 0.2 }, start: { time: 0, x: 2 }, periods: 6, page: "another" } });
+  assert.deepEqual([traits.values, traits.start.x, traits.periods, traits.page, saved], [{ "model.damping": 0.2 }, 2, 6, "<p></p>", 1]);
+  says({ saltus: { periods: 9 } }, {}); // of another window
+  says("a text");
+  assert.deepEqual([traits.periods, saved], [6, 1]);
+  traits.results = [1, 2];
+  changes["change:results"]();
+  assert.deepEqual(sent.pop(), { results: [1, 2] });
+  end();
+  assert.deepEqual([Object.keys(changes).length, listeners.size, frame.gone], [0, 0, true]);
+});
