@@ -314,8 +314,8 @@ def test_derivatives_beyond_the_range_of_numbers_are_said_to_be():
         (("model.smoothing",), "not a number"),
         (("model.beta0", "model.beta0"), "once"),
         (("theta",), "no parameter 'theta'"),
-        ((3,), "parameters must be a list of texts, got"),
-        (3, "parameters must be a list of texts, got 3"),
+        ((3,), "parameters must be the names of parameters, such as .*, got"),
+        (3, "parameters must be the names of parameters, such as .*, got 3"),
     ],
 )
 def test_a_path_to_no_number_is_refused_with_the_near_ones(parameters, message):
