@@ -73,6 +73,10 @@ class InGapCoordinates(ContactModel):
         """The coordinates: mirror images that swap some are not looked for."""
         return self.coordinates
 
+    def mirror(self, load: Any) -> Any:
+        """That of the model as it was given, unless its mirror images swap coordinates."""
+        return super().mirror(load) if self.own_class.images is ContactModel.images else None
+
     def sums(self) -> tuple[list[list[Any]], list[dict[str, Any]]]:
         """A as rows, and for each row the coefficients of load channels in m(t)."""
         names = self.own_class.coordinates
