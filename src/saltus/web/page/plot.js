@@ -11,6 +11,8 @@ import { followGestures } from "./gestures.js";
 /** @typedef {{name: (string|Symbol_)[], low?: number, high?: number}} Axis */
 /** @typedef {[number, number, number, number]} Window  Least and largest abscissa, least and largest ordinate. */
 
+const THIN = 1.4; // pixels
+const UNSEEN = 0.4; // pixels: points of a curve that are nearer than this to the one before are left out
 const FULL = 1e-300; // No window is narrower than rounding allows: see `narrowest`.
 
 /**
@@ -313,8 +315,9 @@ export class Painter {
     ctx.lineWidth = line.width;
     ctx.globalAlpha = line.alpha ?? 1;
     ctx.setLineDash(line.dash ?? []);
-    ctx.lineJoin = "round";
-    ctx.lineCap = line.dash ? "butt" : "round";
+    const thin = line.width <= THIN; // its joins are not seen, and round ones take most of the time of drawing
+    ctx.lineJoin = thin ? "bevel" : "round";
+    ctx.lineCap = thin || line.dash ? "butt" : "round";
   }
 
   /** A line through points; a point that is not finite interrupts it. @param {ArrayLike<number>} xs @param {ArrayLike<number>} ys @param {Line} line */
@@ -323,14 +326,15 @@ export class Painter {
     const { ctx } = this;
     ctx.beginPath();
     let open = false;
+    let [left, top] = [0, 0];
     for (let i = 0; i < xs.length; i++) {
-      const x = this.x(/** @type {number} */ (xs[i]));
-      const y = this.y(/** @type {number} */ (ys[i]));
+      const x = clamp(this.x(/** @type {number} */ (xs[i])), -1e5, 1e5);
+      const y = clamp(this.y(/** @type {number} */ (ys[i])), -1e5, 1e5);
       const there = Number.isFinite(x) && Number.isFinite(y);
-      if (!there) open = false;
-      else if (open) ctx.lineTo(clamp(x, -1e5, 1e5), clamp(y, -1e5, 1e5));
-      else ctx.moveTo(clamp(x, -1e5, 1e5), clamp(y, -1e5, 1e5));
-      open = there;
+      if (there && open && i < xs.length - 1 && Math.abs(x - left) < UNSEEN && Math.abs(y - top) < UNSEEN) continue;
+      if (there && open) ctx.lineTo(x, y);
+      else if (there) ctx.moveTo(x, y);
+      [open, left, top] = [there, x, y];
     }
     ctx.stroke();
     ctx.globalAlpha = 1;

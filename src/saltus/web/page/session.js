@@ -9,7 +9,8 @@ import { refusedNumbers } from "./checks.js";
 /** @typedef {import("./types.js").State} State */
 /** @typedef {import("./types.js").NumberEntry} NumberEntry */
 
-const PER_PERIOD = 72; // samples of a forcing period for the curve in the phase plane
+const PER_PERIOD = 144; // samples of a forcing period for the curve in the phase plane
+const LONG = 30; // periods of a motion that is sampled half as closely, to be drawn within a frame
 const MOST_SAMPLES = 20000; // of a whole motion: more of them are no longer drawn within a frame
 export const MOST_PERIODS = 2000; // of a motion on the page, which remembers every step of it
 
@@ -85,7 +86,8 @@ export class Session {
   sampled(motion) {
     const { first, last } = motion.time;
     const events = motion.events;
-    const step = (this.period ?? (last - first) / 40) / PER_PERIOD;
+    const period = this.period ?? (last - first) / LONG;
+    const step = ((last - first > LONG * period ? 2 : 1) * period) / PER_PERIOD;
     const count = clamp(Math.ceil((last - first) / step), 2, MOST_SAMPLES - 2 * Math.min(events.length, MOST_SAMPLES / 4));
     const times = new Float64Array(count + 1 + events.length);
     let [at, next] = [0, 0];
