@@ -130,13 +130,19 @@ function paintChart(painter, result) {
       const [low, high] = edges(ys, k);
       ctx.globalAlpha = painter.fade ? 0.35 : 1;
       ctx.fillStyle = shade(value / most);
-      ctx.fillRect(painter.x(left), painter.y(high), painter.x(right) - painter.x(left) + 0.6, painter.y(low) - painter.y(high) + 0.6);
+      fillCell(painter, left, right, low, high);
     });
   });
   ctx.globalAlpha = 1;
   for (const { stable, points } of result.curves ?? []) {
     painter.curve(points.map((p) => p[0] ?? NaN), points.map((p) => p[1] ?? NaN), { ...branchLine(painter.palette, stable), width: 1.2 });
   }
+}
+
+/** Fill a cell up to whole pixels, so that neighbours neither overlap nor leave a line between them. @param {Painter} painter @param {number} left @param {number} right @param {number} low @param {number} high */
+function fillCell(painter, left, right, low, high) {
+  const [x0, x1, y0, y1] = [painter.x(left), painter.x(right), painter.y(high), painter.y(low)].map(Math.round);
+  painter.ctx.fillRect(x0, y0, /** @type {number} */ (x1) - /** @type {number} */ (x0), /** @type {number} */ (y1) - /** @type {number} */ (y0));
 }
 
 /** The borders of a cell: amid its value and the next ones. @param {number[]} values @param {number} i @returns {[number, number]} */
@@ -330,7 +336,7 @@ function paintBasins(painter, result) {
       if (label == null || label < 0) return;
       const [low, high] = edges(ys, k);
       painter.ctx.fillStyle = painter.palette.basins[label % painter.palette.basins.length] ?? "";
-      painter.ctx.fillRect(painter.x(left), painter.y(high), painter.x(right) - painter.x(left) + 0.5, painter.y(low) - painter.y(high) + 0.5);
+      fillCell(painter, left, right, low, high);
     });
   });
   painter.ctx.globalAlpha = 1;
