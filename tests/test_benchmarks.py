@@ -234,3 +234,13 @@ def test_the_folds_of_auto_come_to_the_exact_ones(objects: list[str]) -> None:
     assert 0.7 < run.branch[-1].omega <= 0.75
     assert max(verdicts.fold_errors(run.branch, case.KNOWN[1.0])) < 1e-4
     assert verdicts.impossible(run.branch) == 0
+
+
+def test_a_fit_and_one_by_differences_have_the_same_result_and_a_line_each_in_the_report() -> None:
+    from tasks.fitting import NEAR, fits
+
+    rows = fits(rounds=1)
+    assert [row["unknowns"] for row in rows] == [1, 6]
+    assert max(max(row["missed"], row["missed_by_differences"]) for row in rows) < NEAR
+    assert report._fits(rows).count("\n| ") == 3
+    assert not report._fits(None)
