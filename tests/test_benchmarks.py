@@ -236,6 +236,7 @@ def test_the_folds_of_auto_come_to_the_exact_ones(objects: list[str]) -> None:
     assert verdicts.impossible(run.branch) == 0
 
 
+@pytest.mark.thorough
 def test_a_fit_and_one_by_differences_have_the_same_result_and_a_line_each_in_the_report() -> None:
     from tasks.fitting import NEAR, fits
 
