@@ -32,7 +32,7 @@ from saltus_paper.panel_work import Panels
 CHART_WINDOW = ((-2.0, 2.0), (-2.0, 2.0))  # of the initial states
 LOWEST_LOAD = -2.0  # V
 CLOSED_FORM_FROM = 2.0  # Omega from which the closed form of the onset is drawn too
-CHECKED = 100  # cells of a chart that are computed again, with more starts on a finer grid
+CHECKED = 100  # cells of a chart that are computed again, with more starts on a finer grid: each takes as long as 36 cells
 CURVES = 8  # largest number of curves on which motions end, for one chart: more would hide the border of rest
 
 
@@ -52,7 +52,7 @@ def chart_figure(
         draw=partial(_draw, height=height),
         page=partial(_page, name=f"Fig. {name[3:]}"),
         measure=measure,
-        quick={"size": 36, "curves": 1},
+        quick={"size": 36, "curves": 1, "checked": 50},
         module=module,
     )
 
@@ -62,13 +62,21 @@ def _panels(charts: Mapping[str, Mapping[str, float]], size: int = 101, **option
 
 
 def panel(
-    *, beta0: float, damping: float, frequency: float, widest: float, size: int, curves: int = CURVES, **options: Any
+    *,
+    beta0: float,
+    damping: float,
+    frequency: float,
+    widest: float,
+    size: int,
+    curves: int = CURVES,
+    checked: int = CHECKED,
+    **options: Any,
 ) -> Any:
     """A `saltus.studies.bordered_chart` of the paper's system, with the share of its cells that are wrong (`wrong_cells`)."""
     here = under_force(frequency, 0.1, beta0=beta0, damping=damping)
     horizontal, vertical = np.linspace(0.0, widest, size), np.linspace(LOWEST_LOAD, 0.0, size)
     tree = bordered_chart(here, curves=curves, horizontal=horizontal, vertical=vertical, **({"window": CHART_WINDOW} | options))
-    tree["chart"].attrs |= wrong_cells(here, tree["chart"].to_dataset(), cells=CHECKED)
+    tree["chart"].attrs |= wrong_cells(here, tree["chart"].to_dataset(), cells=checked)
     tree["static"].attrs |= {"what": "quasi-static borders", "saltus_version": tree["chart"].attrs["saltus_version"]}
     tree.attrs = {"system": here.to_json(), "beta0_degrees": beta0, "damping": damping, "frequency": frequency}
     return tree
