@@ -102,6 +102,20 @@ def test_ten_balls_in_a_row_exchange_their_speeds():
     np.testing.assert_allclose(motion.impacts.time, met, rtol=0, atol=1e-11)
 
 
+def test_ten_balls_that_fall_on_one_another_without_bounce_rest_as_a_stack():
+    """As many contacts as coordinates: ball i falls by 1 + 0.3 i on those below, which rest by then."""
+    row = row_of_balls(10)
+    floor = property(lambda self: (Contact(name="floor", coordinate="x0"), *row.contacts.fget(self)))
+    falls = {"contacts": floor, "force": lambda self, t, q, velocity, load: [-1.0] * 10}
+    stack = dataclasses.make_dataclass("Stack", [], bases=(row,), namespace=falls, frozen=True, kw_only=True)
+    system = System(model=stack(size=1.0), impact=NewtonImpact(e=0.0))
+    motion = simulate(system, **{f"x{i}": 1.0 + 1.3 * i for i in range(10)}, duration=3.0)
+    assert str(motion.stop) == "rest"
+    assert len(motion.closed) == 10
+    np.testing.assert_allclose(motion.impacts.time, np.sqrt(2.0 * (1.0 + 0.3 * np.arange(10))), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(motion.position, np.arange(10.0), rtol=0, atol=1e-14)
+
+
 def test_balls_that_touch_are_hit_together_by_the_law_of_all_gaps():
     """Not one after the other: the gap that is hit opens with e times its speed, and the others, which stay closed, with none."""
     row = row_of_balls(3)
