@@ -40,8 +40,9 @@ def chart():
 
 @cache
 def basins():
-    """Basins of few cells."""
-    return saltus.basins_of_attraction(SYSTEM, theta=np.linspace(-2.5, 2.5, 6), velocity=np.linspace(-2.0, 2.0, 5))
+    """Basins of few cells, with the curve between them."""
+    theta, velocity = np.linspace(-2.5, 2.5, 6), np.linspace(-2.0, 2.0, 5)
+    return saltus.basins_of_attraction(SYSTEM, theta=theta, velocity=velocity, curves=True)
 
 
 @cache

@@ -94,6 +94,10 @@ def test_basins_have_the_labels_of_their_cells_and_names_for_attractors():
     labels = data["label"].transpose("theta", "velocity").values
     assert (np.array(entry["cells"]) + 1 == labels).all()
     assert len(set(labels.ravel().tolist())) > 1
+    (boundary,) = entry["curves"]
+    assert [point[0] for point in boundary["points"]] == plain(data["boundary_theta"].values)
+    assert [point[1] for point in boundary["points"]] == plain(data["boundary_velocity"].values)
+    assert len(boundary["points"]) > 100
     names = {each["label"] + 1: each["name"] for each in entry["attractors"]}
     for number, period, amplitude in zip(
         data["attractor"].values, data["attractor_period"].values, data["amplitude"].values, strict=True

@@ -191,17 +191,21 @@ def _basins(data: Any) -> dict[str, Any]:
         "y": _listed(data[y].values),
         "cells": [[int(each) - 1 for each in row] for row in label],
         "attractors": attractors,
-        "curves": [],
+        "curves": [_points("boundary", True, data, [f"boundary_{x}", f"boundary_{y}"])] if f"boundary_{x}" in data else [],
     }
 
 
 def _curve(data: Any) -> dict[str, Any]:
     plane = [str(name) for name in data.attrs["plane"]]
     stable = bool(data.attrs.get("stable", True))
-    points = np.column_stack([data[name].values for name in plane])
-    kind = str(data.attrs["kind"])
-    curve = {"name": kind, "stable": stable, "points": [[_number(a), _number(b)] for a, b in points.tolist()]}
+    curve = _points(str(data.attrs["kind"]), stable, data, plane)
     return {"kind": "curves", "plane": _plane(*plane), "curves": [curve]}
+
+
+def _points(name: str, stable: bool, data: Any, columns: list[str]) -> dict[str, Any]:
+    """A curve of the phase plane; it is interrupted where a number is nan."""
+    points = np.column_stack([data[column].values for column in columns])
+    return {"name": name, "stable": stable, "points": [[_number(a), _number(b)] for a, b in points.tolist()]}
 
 
 def _plane(x: str, y: str) -> list[str]:
