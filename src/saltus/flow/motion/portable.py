@@ -82,7 +82,7 @@ class PortableMotion:
         self.system, self.run = system, program(system)
         self.kernel = PortableKernel(self.run.trace.several)
 
-        once = {path: part_at(system, path) for path, _ in self.run.trace.records}
+        once = {path: part_at(system, path) for path, _ in self._evaluated[0].records}
         self._pulses = [path for path, signal in once.items() if isinstance(signal, Pulse)]
 
     def functions(self) -> list[WrittenFunction]:
@@ -93,7 +93,7 @@ class PortableMotion:
         return [*structure_functions(self.run.trace), edges, margins_function(*self._evaluated[:2]), *drawn]
 
     @cached_property
-    def _twin(self) -> System:
+    def _twin(self) -> Any:
         """The system with symbols in the places of its numbers."""
         places = count()
         return substitute(self.system, lambda path, value: Expr("parameter", (), next(places)))
@@ -125,7 +125,7 @@ class PortableMotion:
                 traced = trace(self.system, chosen, energy=energy)
             except SaltusError:  # margins may compare, which only Python's own check of a motion can; and not all have an energy
                 continue
-            if traced.records == self.run.trace.records:
+            if traced.records[: len(self.run.trace.records)] == self.run.trace.records:  # the kernel finds its own rows
                 return traced, tuple(traced.margins), energy
         return self.run.trace, (), False
 
@@ -167,7 +167,7 @@ class PortableMotion:
     def _records(self) -> dict[str, Any]:
         """What the load reads of tables: of a pulse, which clock it is; of a record, its own breakpoints and polynomials."""
         rows: list[dict[str, Any]] = []
-        for path, order in self.run.trace.records:
+        for path, order in self._evaluated[0].records:
             if path in self._pulses:
                 rows.append({"pulse": self._pulses.index(path), "order": order})
             else:
