@@ -4,8 +4,9 @@ import { test } from "node:test";
 import { allDigits, degreesOf, radians, roundStep, tickLabel, ticks, typedNumber } from "../../src/saltus/web/page/numbers.js";
 import { asText, symbolOf } from "../../src/saltus/web/page/symbols.js";
 import { linkOf, stateOf } from "../../src/saltus/web/page/link.js";
-import { firstState, prepared } from "../../src/saltus/web/page/description.js";
+import { firstState, goesOn, prepared, tamed } from "../../src/saltus/web/page/description.js";
 import { cellPoints } from "../../src/saltus/web/page/cell_drawing.js";
+import { amplitudeOf } from "../../src/saltus/web/page/settling.js";
 import { jumpsOf } from "../../src/saltus/web/page/sweep.js";
 import { runs, shade } from "../../src/saltus/web/page/results_view.js";
 import { wideEnough } from "../../src/saltus/web/page/plot.js";
@@ -186,4 +187,28 @@ test("the view of a notebook tells the page and the model of one another, and li
   assert.deepEqual(sent.pop(), { results: [1, 2] });
   end();
   assert.deepEqual([Object.keys(changes).length, listeners.size, frame.gone], [0, 0, true]);
+});
+
+test("an amplitude is the largest size between samples, also where it is at an impact", () => {
+  const along = (x, last) => ({ time: { first: 0, last }, state: (t) => [x(t)] });
+  const wave = along((t) => Math.sin(t) + 0.3 * Math.sin(3.7 * t + 1), 40);
+  let most = 0;
+  for (let t = 0; t <= 40; t += 1e-4) most = Math.max(most, Math.abs(wave.state(t)[0]));
+  assert.ok(Math.abs(amplitudeOf(wave, 0, 0, 2 * Math.PI) - most) < 1e-7);
+  const bounces = along((t) => 2 - Math.abs((t % 1.7) - 0.61), 10); // a corner at each impact
+  assert.ok(Math.abs(amplitudeOf(bounces, 0, 0, 1) - 2) < 1e-8);
+});
+
+test("motions settle under loads that repeat themselves or are constant, not under a pulse", () => {
+  const under = (kind) => prepared({ ...description, load: [{ channel: "force", kind, parameters: [] }], numbers: [entry("model.damping", 0.1)] });
+  assert.ok(goesOn(description));
+  assert.ok(goesOn(under("Constant")));
+  assert.ok(!goesOn(under("OneSine")));
+});
+
+test("a state from a link asks for no more than the page can do", () => {
+  const first = firstState(description);
+  const state = tamed({ ...first, periods: 1e9, speed: 1e9, coordinate: 7, selected: { result: 3, branch: 0, point: 0 }, sweep: { ...first.sweep, count: 1e9, periods: -4 } }, description);
+  assert.deepEqual([state.periods, state.speed, state.coordinate, state.selected], [2000, 1000, 0, null]);
+  assert.deepEqual([state.sweep.count, state.sweep.periods], [2000, 1]);
 });
