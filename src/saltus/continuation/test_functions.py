@@ -26,9 +26,10 @@ class LocationSettings:
     nodes: int = 4  # The number of nearest points for inverse interpolation.
     apart: float = 0.5  # A further point is solved for at this share of the distance from an end to a singular zero.
     near: float = 0.3  # How far a point may lie off the cubic through its neighbours, as a share of their distance.
-    # Where a curve has a kink at the zero of a one-sided function, points beside the kink are off the cubic at every distance. A
-    # bracket that is narrower than this, in the norm of the curve, is then narrow enough; wider ones may hide another curve.
-    kink: float = 1e-8
+    # Where a curve has a kink at the zero of a one-sided function, points beside the kink are off the cubic at every distance. The
+    # bracket of a step that is shorter than this, in the norm of the curve, is then narrow enough; longer steps are to be shortened,
+    # as they may hide another curve.
+    kink: float = 2e-9
 
 
 SETTINGS = LocationSettings()
@@ -70,7 +71,7 @@ def located(test: TestFunction, a: Any, b: Any, singular: bool = False) -> Zero 
     following = _next_share_from_one_side if test.one_sided else _next_share
     while (share := following(known, before, test.width, widths)) is not None:
         point = at_share(share)
-        if point is None and test.one_sided and widths[-1] * a.curve.norm(b.place - a.place) < SETTINGS.kink:
+        if point is None and test.one_sided and a.curve.norm(b.place - a.place) < SETTINGS.kink:
             break
         if point is None or not np.isfinite(value := test.value(point)):
             return None
