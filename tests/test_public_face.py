@@ -64,7 +64,13 @@ def made():
     branch.to_xarray()  # computes defects, which are then kept
     record = saltus.Measurement(start={"theta": 0.3}, time=[0.5, 1.0], values={"theta": [0.3, 0.2]}, sigma=0.1)
     found = saltus.fit(SYSTEM, record, {"model.damping": (0.0, 1.0)}, starts=1)
-    more = {"record": record, "fit": found, "sensitivities": saltus.sensitivities(SYSTEM, theta=0.3, periods=1)}
+    explorer = saltus.explore(SYSTEM, theta=0.3)
+    more = {
+        "explorer": explorer,
+        "record": record,
+        "fit": found,
+        "sensitivities": saltus.sensitivities(SYSTEM, theta=0.3, periods=1),
+    }
     return more | {"motion": motion, "orbit": orbit, "branch": branch, "fold": fold, "curve": curve, "chart": chart, "many": many}
 
 
@@ -98,6 +104,7 @@ def good(made):
         "saltus.continue_special": {"special": fold, "path": "load.vertical", "bounds": (-0.6, -0.4)},
         "saltus.doubling_cascade": {"first": fold, "bounds": (0.8, 1.1)},
         "saltus.energies": {"of": made["motion"]},
+        "saltus.explore": one,
         "saltus.excludes_tori": {"system": SYSTEM},
         "saltus.find_attractors": {"system": SYSTEM},
         "saltus.page": {"system": SYSTEM, "theta": 0.3},
@@ -212,6 +219,7 @@ def good(made):
         "Branch.is_joined": (branch.is_joined, {"before": 0}),
         "Branch.solved_at": (branch.solved_at, {"value": 1.0}),
         "Branch.solved_between": (branch.solved_between, {"before": 0, "value": 0.81}),
+        "Explorer.add": (made["explorer"].add, {"result": branch}),
         "Chirp": (saltus.Chirp, {"amplitude": 0.1, "frequency": 1.0, "end_frequency": 2.0, "duration": 3.0}),
         "Contact": (saltus.Contact, contact),
         "EnergyRestitution": (saltus.EnergyRestitution, {"r": 0.9}),
@@ -349,6 +357,7 @@ def alone(monkeypatch, tmp_path):
     from saltus.flow.lanes import ensemble
     from saltus.flow.motion import simulate as simulation
     from saltus.orbits.equations import one_contact
+    from saltus.web import study_page
 
     def begun(*_, **__):
         raise Computed
@@ -357,6 +366,7 @@ def alone(monkeypatch, tmp_path):
     monkeypatch.setattr(simulation, "follow", begun)
     monkeypatch.setattr(ensemble, "compile_driver_aside", begun)
     monkeypatch.setattr(one_contact.OneContactEquations, "evaluate", begun)
+    monkeypatch.setattr(study_page, "_page", begun)
 
 
 def answer(function, named):

@@ -26,9 +26,8 @@ class LocationSettings:
     nodes: int = 4  # The number of nearest points for inverse interpolation.
     apart: float = 0.5  # A further point is solved for at this share of the distance from an end to a singular zero.
     near: float = 0.3  # How far a point may lie off the cubic through its neighbours, as a share of their distance.
-    # Where a curve has a kink at the zero of a one-sided function, points beside the kink are off the cubic at every distance. The
-    # bracket of a step that is shorter than this, in the norm of the curve, is then narrow enough; longer steps are to be shortened,
-    # as they may hide another curve.
+    # Where a curve has a kink at the zero of a one-sided function, points beside it are off the cubic at every distance. The
+    # bracket of a step shorter than this, in the norm of the curve, is then narrow enough; longer steps may hide another curve.
     kink: float = 2e-9
 
 
