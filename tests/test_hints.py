@@ -63,6 +63,12 @@ def test_the_refusal_says_how_it_is_meant(what: str) -> None:
         ask()
 
 
+def test_a_name_that_lives_in_a_room_is_answered_with_the_room() -> None:
+    with pytest.raises(AttributeError, match=r"^saltus has no 'uncertainty_exponent'; it is in saltus\.attractors$"):
+        _ = saltus.uncertainty_exponent
+    assert callable(saltus.attractors.uncertainty_exponent)
+
+
 def test_a_motion_names_its_coordinates() -> None:
     with pytest.raises(AttributeError, match=r"no 'x'; known here: theta$"):
         _ = saltus.simulate(SYSTEM, theta=0.3, periods=0).x

@@ -38,9 +38,21 @@ def front_door(package: str, file: str) -> tuple[Callable[[str], Any], Callable[
             return found
         if os.path.exists(os.path.join(os.path.dirname(file), f"{name}.py")):
             raise AttributeError(name)  # Python asks for the name of a file, which it then imports
-        raise AttributeError(f"{package} has no {name!r}; {near(name, public)}")
+        raise AttributeError(f"{package} has no {name!r}; {_elsewhere(name) or near(name, public)}")
 
     return get, names, public
+
+
+def _elsewhere(name: str) -> str:
+    """Which room has a name behind its door; empty if none has."""
+    here = os.path.dirname(__file__)
+    for room in sorted(os.listdir(here)):
+        stub = os.path.join(here, room, "__init__.pyi")
+        if os.path.exists(stub):
+            with open(stub, encoding="utf-8") as lines:
+                if any(line.split()[-1:] == [name] for line in lines if line.startswith("from ")):
+                    return f"it is in saltus.{room}"
+    return ""
 
 
 class Room(ModuleType):

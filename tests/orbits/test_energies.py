@@ -148,3 +148,35 @@ def test_the_power_of_an_orbit_is_split_between_dashpot_and_stops():
         np.sum((1 - 0.7**2) * speeds**2 / 2) / orbit.duration, rel=1e-9
     )
     assert power["load.force"] == pytest.approx(saltus.mean_dissipated_power(orbit), rel=1e-10)
+
+
+@dataclass(frozen=True)
+class OwnStop(saltus.OneContactModel):
+    """A wall oscillator of a user's own, as it is first written."""
+
+    sides = (1,)
+
+    def acceleration(self, t, theta, velocity, side, load):
+        return -theta
+
+    def reset(self, t, velocity, side, load, impact):
+        return side, -impact.velocity_after(self, t, velocity, side, side, load)
+
+
+def test_energies_of_a_model_without_kinetic_energy_say_which_method_is_missing():
+    motion = saltus.simulate(saltus.System(model=OwnStop(), impact=saltus.NewtonImpact(0.5)), theta=1.0, duration=3.0)
+    line = r"add kinetic_energy\(self, t, theta, velocity, side, load\), such as return 0\.5 \* velocity\*\*2"
+    for ask in (energies, saltus.mean_dissipated_power):
+        with pytest.raises(saltus.ParameterError, match=f"^OwnStop defines no kinetic_energy, which this needs: {line}"):
+            ask(motion)
+    added = type("Own", (OwnStop,), {"kinetic_energy": lambda self, t, theta, velocity, side, load: 0.5 * velocity**2})
+    motion = saltus.simulate(saltus.System(model=added(), impact=saltus.NewtonImpact(0.5)), theta=1.0, duration=3.0)
+    taken = energies(motion).energy.sel(part="impact")
+    assert float(taken) == pytest.approx((1 - 0.5**2) / 2, rel=1e-10)  # from 1 it meets the wall with the speed 1
+
+
+def test_a_system_has_no_energies_by_itself():
+    system = saltus.System(model=OwnStop(), impact=saltus.NewtonImpact(0.5))
+    for ask in (energies, saltus.mean_dissipated_power, lambda of: saltus.transmissibility(of, "force")):
+        with pytest.raises(saltus.ParameterError, match=r"must be an orbit or a motion, got a System; give saltus\.find_orbit"):
+            ask(system)

@@ -1,6 +1,7 @@
 """The classes of models: what their base class says of them, and what is refused when a system is made of one."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 import saltus
 from saltus import Contact, ContactModel, Friction, Model, OneContactModel, ParameterError, System
 from saltus.systems import MODELS
+from saltus.web.accepted import accepted
 
 
 def fall(self, t, q, velocity, side, load):
@@ -157,3 +159,37 @@ def test_energy_cannot_be_restituted_to_more_than_there_was():
     for r in (1.1, 0.0, math.nan):
         with pytest.raises(ParameterError, match="r must lie in"):
             saltus.EnergyRestitution(r=r)
+
+
+@dataclass(frozen=True, kw_only=True)
+class OwnChecks(OneContactModel):
+    """A model that refuses numbers as a newcomer writes it."""
+
+    stiffness: float = 1.0
+    sides = (1,)
+
+    def acceleration(self, t, theta, velocity, side, load):
+        return -self.stiffness * theta
+
+    def reset(self, t, velocity, side, load, impact):
+        return bounce(self, t, velocity, side, load, impact)
+
+    def __post_init__(self):
+        if self.stiffness < 0.0:
+            raise ValueError("stiffness must be >= 0")
+        if self.stiffness > 5.0:
+            raise ValueError("that spring is too stiff")
+
+
+def test_what_the_class_of_a_user_refuses_is_said_with_its_path_and_value():
+    system = System(model=OwnChecks(), impact=saltus.NewtonImpact(0.8))
+    with pytest.raises(ParameterError) as refused:
+        system.with_({"model.stiffness": -1.5})
+    assert refused.value.parameter == "model.stiffness"
+    assert str(refused.value) == "model.stiffness must be >= 0, got -1.5"
+    with pytest.raises(ParameterError, match=r"^model\.stiffness: that spring is too stiff, got 7\.0$"):
+        system.with_({"model.stiffness": 7.0})
+    with pytest.raises(ParameterError, match=r"model\.stiffness must be >= 0, got -2\.0"):
+        saltus.simulate_many(system, theta=0.1, duration=1.0, parameters={"model.stiffness": [1.0, -2.0]})
+    ends = {side: bound["end"] for side, bound in accepted(system)["model.stiffness"].items()}
+    assert ends == {"least": 0.0, "most": 5.0}  # which are the ends of the slider of a page

@@ -137,6 +137,9 @@ def _deviation(course: SampledPart, values: Any) -> float:
 
 def course_of(of: Followed, periods: int | None) -> SampledPart:
     """An orbit's period, or the last periods of a motion."""
+    if not isinstance(of, Followed):
+        hint = "give saltus.find_orbit(system, ...) or saltus.simulate(system, ...)"
+        raise ParameterError(f"of must be an orbit or a motion, got a {type(of).__name__}; {hint}", "of")
     if periods is not None:
         check_count("periods", periods, 1)
     if isinstance(of, Motion):

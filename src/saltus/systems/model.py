@@ -181,7 +181,7 @@ class Model:
         raise NotImplementedError(f"{type(self).__name__} must define acceleration(t, theta, velocity, side, load)")
 
     def kinetic_energy(self, t: Any, theta: Any, velocity: Any, side: Any, load: Any) -> Any:
-        """The kinetic energy; impact laws that conserve or restitute energy need it.
+        """The kinetic energy; `saltus.energies` and impact laws that restitute energy need it.
 
         Parameters
         ----------
@@ -196,8 +196,11 @@ class Model:
         load
             The load, whose channels are called with the time: `load.horizontal(t)`.
         """
+        name, several = type(self).__name__, len(self.coordinates) > 1
         raise ParameterError(
-            f"{type(self).__name__} defines no kinetic_energy, so this impact law cannot be used with it", "impact"
+            f"{name} defines no kinetic_energy, which this needs: add kinetic_energy(self, t, theta, velocity, side, load), such "
+            f"as return {'0.5 * sum(v**2 for v in velocity)' if several else '0.5 * velocity**2'} where the mass is 1",
+            "model",
         )
 
     def margins(self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Any) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from functools import cache
 from importlib import import_module
 from typing import Any, TypeVar
 
-from saltus.errors import ParameterError, near, shown
+from saltus.errors import ParameterError, SaltusError, near, shown
 from saltus.systems.gap_coordinates import IN_GAPS, in_gap_coordinates
 from saltus.systems.impact_laws import Factors, ImpactLaw
 from saltus.systems.load import Load
@@ -85,8 +85,26 @@ def replace(node: Any, changes: Mapping[str, Any], where: str = "") -> Any:
         return Factors(parts.values())
     try:
         return dataclasses.replace(node, **parts)
-    except ParameterError as error:
-        raise (error.inside(where[:-1]) if where else error) from None
+    except SaltusError as error:
+        raise (error.inside(where[:-1]) if where and isinstance(error, ParameterError) else error) from None
+    except REFUSALS as error:
+        refused = refusal(error, {str(path).partition(".")[0]: parts[str(path).partition(".")[0]] for path in changes})
+        raise (refused.inside(where[:-1]) if where else refused) from error
+
+
+REFUSALS = (ValueError, TypeError, ArithmeticError)  # what the checks of a user's own class raise where a number has no meaning
+
+
+def refusal(error: Exception, given: Mapping[str, Any]) -> ParameterError:
+    """The error of a user's own class as a ParameterError, with the name and value of the field that it is about.
+
+    That is the field of those `given` with which its sentence begins, or the only one that is given.
+    """
+    sentence = str(error) or type(error).__name__
+    name = next((name for name in given if sentence.startswith(f"{name} ")), next(iter(given)) if len(given) == 1 else None)
+    if name is not None and shown(given[name]) not in sentence:
+        sentence += f", got {shown(given[name])}"
+    return ParameterError(sentence, name)
 
 
 def substitute(node: Any, leaf: Callable[[str, float], Any], prefix: str = "") -> Any:
@@ -252,5 +270,5 @@ def build(cls: type, fields: dict[str, Any], where: str) -> Any:
         return cls(**fields)
     except ParameterError as error:
         raise error.inside(where) from None
-    except (ValueError, TypeError, ArithmeticError) as error:  # a class of the user's own may raise anything
-        raise ParameterError(f"{where}: {error}", where) from error
+    except REFUSALS as error:
+        raise refusal(error, fields).inside(where) from error
