@@ -1,6 +1,8 @@
 """Periodic orbits with several contacts: against closed forms, the reduced model, simulation, and through their switchings."""
 
 import math
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -257,3 +259,31 @@ def test_what_has_no_equations_is_refused_by_name(ask, error, words):
 def test_curves_of_changes_of_events_are_refused_by_name(branch):
     with pytest.raises(ParameterError, match="LP, PD, BPC"):
         saltus.continue_special(branch.special[0], "load.frequency", (0.9, 1.1))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pair(saltus.ContactModel):
+    """Two equal masses between springs, of which the second one may hit a stop."""
+
+    stop: float = 0.5
+    coordinates: ClassVar[tuple[str, ...]] = ("x", "y")
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+
+    @property
+    def contacts(self):
+        return (saltus.Contact(name="stop", coordinate="y", sign=-1, position=self.stop),)
+
+    def force(self, t, q, velocity, load):
+        (x, y), (u, v) = q, velocity
+        return load.force(t) - 2.0 * x + y - 0.04 * u + 0.02 * v, x - y - 0.02 * v + 0.02 * u
+
+
+def test_a_torus_is_born_where_a_complex_pair_leaves_the_circle_and_not_beside_grazings_or_at_real_pairs():
+    """With four multipliers the product of all a b - 1 jumps at a grazing, and vanishes where a real pair has the product 1."""
+    load = Load(frequency=0.52, force=Harmonic(amplitude=0.05))
+    system = System(model=Pair(), load=load, impact=NewtonImpact(e=0.7))
+    branch = saltus.continue_orbit(saltus.find_orbit(system, x=0.0, y=0.0), "load.frequency", (0.5, 0.7))
+    tori = [point for point in branch.special if point.kind == SpecialKind.NS]
+    assert [point.parameter for point in tori] == [pytest.approx(0.62554293, abs=1e-6)]
+    assert min(abs(abs(m) - 1.0) for m in tori[0].orbit.multipliers if m.imag) < 1e-9
+    assert any(point.kind == SpecialKind.GR for point in branch.special)

@@ -174,7 +174,7 @@ def test_a_torus_is_born_where_areas_may_grow():
 def test_a_pair_beyond_the_circle_where_areas_never_grow_is_reported_as_missed(monkeypatch):
     from saltus.orbits.branches import branch_events
 
-    monkeypatch.setattr(branch_events, "complex_pair", lambda orbit: 1.01)
+    monkeypatch.setattr(branch_events, "complex_pairs", lambda orbit: np.array([1.01]))
     system = soft_stop(amplitude=0.05, frequency=0.5)
     branch = saltus.continue_orbit(saltus.find_orbit(system, x=0.0), "load.force.amplitude", (0.04, 0.06))
     assert branch.missed

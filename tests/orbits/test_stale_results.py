@@ -6,7 +6,7 @@ from typing import ClassVar
 import pytest
 
 import saltus
-from saltus import provenance
+from saltus import result as results
 from saltus.errors import ParameterError
 from saltus.orbits import orbits_of
 from saltus.systems import Harmonic, Load, OneContactModel, System, VelocityReduction, WallOscillator, register
@@ -74,7 +74,7 @@ def test_another_class_of_the_same_name_is_seen(branch, monkeypatch):
 
 
 def test_another_version_of_the_results_is_seen(branch, monkeypatch):
-    monkeypatch.setattr(provenance, "RESULT_VERSION", provenance.RESULT_VERSION + 1)
+    monkeypatch.setattr(results, "RESULT_VERSION", results.RESULT_VERSION + 1)
     with pytest.raises(ParameterError, match=r"it is by saltus [\d.]+, whose results are of version \d+, and here of \d+"):
         orbits_of(branch)
 

@@ -123,7 +123,7 @@ WITHOUT = {
     "saltus.branches_of": "gives branches, each as saltus.branch_of does",
     "orbits.orbits_of": "gives orbits, each as saltus.find_orbit does",
     **dict.fromkeys(("saltus.load", "saltus.load_study", "saltus.to_mat", "saltus.plot", "saltus.register"), WRITES),
-    **dict.fromkeys(("saltus.to_csv", "saltus.animate", "saltus.page"), WRITES),
+    **dict.fromkeys(("saltus.to_csv", "saltus.animate", "saltus.page", "saltus.explore"), WRITES),
     "saltus.to_pandas": "gives a table",
     **dict.fromkeys(("saltus.overturning_spectrum", "saltus.fragility"), "is drawn in tests/studies/test_overturning.py"),
     **dict.fromkeys(("saltus.save", "saltus.show_progress", "sweep.remove_store", "sweep.status"), WRITES),

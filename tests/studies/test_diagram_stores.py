@@ -16,7 +16,7 @@ from diagram_script import BOUNDS, FREQUENCY, contact_diagram, diagram
 from shared_systems import forced
 from typer.testing import CliRunner
 
-from saltus import provenance
+from saltus import result as results
 from saltus.cli.app import app
 from saltus.errors import ParameterError, SweepError
 from saltus.files import checked_content, write_dataset
@@ -191,7 +191,7 @@ def test_the_store_of_another_diagram_is_refused(kept, changes, differs):
 
 
 def test_the_store_of_another_version_is_refused(kept, monkeypatch):
-    monkeypatch.setattr(provenance, "RESULT_VERSION", provenance.RESULT_VERSION + 1)
+    monkeypatch.setattr(results, "RESULT_VERSION", results.RESULT_VERSION + 1)
     with pytest.raises(ParameterError, match="result_version"):
         diagram(store=kept / "diagram.zarr")
 

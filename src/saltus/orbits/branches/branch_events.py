@@ -18,7 +18,7 @@ from saltus.orbits.branches.orbit_curve import (
     OrbitPoint,
     Test,
     branch_tests,
-    complex_pair,
+    complex_pairs,
     grazing,
     never_torus,
 )
@@ -55,7 +55,8 @@ class BranchLimits:
     # a thousand of the longest steps lead there.
     largest: float = 1e2
     same_fold: float = 1e-8  # A fold and a crossing of branches whose parameters differ by less than this are one point.
-    # A complex pair of multipliers outside the unit circle by more than this, where areas never grow, is an error of saltus.
+    # How far a complex pair of multipliers may be from the unit circle at an NS; a pair farther outside, where areas of the state
+    # plane never grow, is an error of saltus.
     impossible_pair: float = 1e-6
     settling: int = 40  # periods of an orbit for which a motion settles beyond a change; nearly all of its multipliers are 0
     # Distances in both directions along the parent's branch, tried in turn until they enclose its special point.
@@ -155,8 +156,8 @@ class BranchEvents(OrbitEvents):
         return None if point.orbit.grazes else int(np.count_nonzero(np.abs(point.orbit.multipliers) > 1.0 + TOLERANCES.on_circle))
 
     def distinct(self, found: list[Zero]) -> list[Zero]:
-        """The special points, without crossings of branches that are only folds, and without the zeros of `torus` that real
-        multipliers make or that lie where areas of states never grow."""
+        """The special points, without crossings of branches that are only folds, and without the zeros of `torus` at which no
+        complex pair of multipliers has the modulus 1 or that lie where areas of states never grow."""
         folds = [zero.parameter for zero in found if zero.kind == SpecialKind.LP]
 
         def is_fold(zero: Zero) -> bool:
@@ -164,7 +165,9 @@ class BranchEvents(OrbitEvents):
             return crossing and any(abs(zero.parameter - p) < SETTINGS.same_fold for p in folds)
 
         def impossible(zero: Zero) -> bool:
-            return zero.kind == SpecialKind.NS and (never_torus(zero.point.orbit) or not complex_pair(zero.point.orbit))
+            orbit = zero.point.orbit
+            on_circle = (np.abs(complex_pairs(orbit) - 1.0) < SETTINGS.impossible_pair).any()
+            return zero.kind == SpecialKind.NS and (never_torus(orbit) or not on_circle)
 
         return [zero for zero in found if not is_fold(zero) and not impossible(zero)]
 
@@ -174,8 +177,9 @@ class BranchEvents(OrbitEvents):
 
     def ended(self, run: Run, ahead: OrbitPoint, cut: Cut | None) -> End | None:
         """The end of an orbit that has shrunk to rest, or has lost its stability."""
-        if complex_pair(ahead.orbit) > 1.0 + SETTINGS.impossible_pair and never_torus(ahead.orbit):
-            where, modulus = ahead.parameters, f"{complex_pair(ahead.orbit):.9g}"
+        largest = complex_pairs(ahead.orbit).max(initial=0.0)
+        if largest > 1.0 + SETTINGS.impossible_pair and never_torus(ahead.orbit):
+            where, modulus = ahead.parameters, f"{largest:.9g}"
             run.missed.append(Missed(OrbitMissed.IMPOSSIBLE_PAIR, SpecialKind.NS, where, where, modulus))
         if self.while_stable and cut is None and not ahead.orbit.stable:
             return super().ended(run, ahead, cut) or End(OrbitEnd.UNSTABLE, ahead.parameter)

@@ -176,13 +176,13 @@ def torus(point: OrbitPoint) -> float:
     """The product of (a b - 1) over all pairs (a, b) of multipliers: smooth, and 0 where a complex pair has the modulus 1.
 
     It is 0 at a real pair with a b = 1 as well, which is no special point; `BranchEvents.distinct` removes these zeros. A value
-    within rounding of 0 is given as 0, as all along a branch of a system without loss; at a grazing the multipliers are unknown
-    and it is -1. For two multipliers a b comes from the determinants of the segments' maps: their product keeps its digits
-    where one multiplier is large.
+    within rounding of 0 is given as 0, as all along a branch of a system without loss. At a grazing the multipliers jump, and its
+    sign may, so that it is nan there. For two multipliers a b comes from the determinants of the segments' maps: their product
+    keeps its digits where one multiplier is large.
     """
     values, evaluation = point.orbit.multipliers, point.evaluation
     if point.orbit.grazes:
-        return -1.0
+        return math.nan
     with np.errstate(all="ignore"):
         if len(values) == 2:
             half = float(np.prod(_areas(evaluation.here) / _areas(evaluation.there)))
@@ -191,7 +191,7 @@ def torus(point: OrbitPoint) -> float:
             values = np.where(np.abs(values) > MULTIPLIER_ROUNDING * np.abs(values).max(), values, 0.0)
             first, second = np.triu_indices(len(values), 1)
             product = float(np.prod(values[first] * values[second] - 1.0).real)
-    return -1.0 if not math.isfinite(product) else product if abs(product) > MULTIPLIER_ROUNDING else 0.0
+    return 0.0 if abs(product) <= MULTIPLIER_ROUNDING else product if math.isfinite(product) else math.nan
 
 
 def _areas(maps: np.ndarray) -> np.ndarray:
@@ -201,13 +201,13 @@ def _areas(maps: np.ndarray) -> np.ndarray:
     return np.asarray(maps[..., 0, 0] * maps[..., 1, 1] - maps[..., 0, 1] * maps[..., 1, 0])
 
 
-def complex_pair(orbit: PeriodicOrbit) -> float:
-    """The largest modulus of a complex pair of multipliers; 0 where there is none.
+def complex_pairs(orbit: PeriodicOrbit) -> np.ndarray:
+    """The moduli of the complex pairs of multipliers, (n,).
 
     Closed contacts make multipliers 0, and rounding turns these into small complex pairs, which do not count.
     """
     values = orbit.multipliers
-    return float(np.abs(values[(np.abs(values.imag) > 1e-9) & (np.abs(values) > VANISHING)]).max(initial=0.0))
+    return np.asarray(np.abs(values[(values.imag > 1e-9) & (np.abs(values) > VANISHING)]))
 
 
 def never_torus(orbit: PeriodicOrbit) -> bool:
