@@ -52,6 +52,57 @@ def test_an_ensemble_has_a_row_for_each_motion_and_stops_are_words():
     assert set(stops.sel(b=0).values) == {"captured"}
 
 
+def test_a_grid_of_ones_own_has_a_row_for_each_point_whatever_its_number_of_names(tmp_path):
+    def place(a, b, c):
+        return 100 * a + 10 * b + c
+
+    axes = {"a": [1.0, 2.0], "b": [3.0, 4.0, 5.0], "c": [6.0, 7.0]}
+    for count in (1, 2, 3):
+        rest = {"b": 0.0, "c": 0.0} if count == 1 else {"c": 0.0} if count == 2 else {}
+        chosen = dict(list(axes.items())[:count])
+        found = saltus.map_over(lambda rest=rest, **point: place(**point, **rest), chosen)
+        with saltus.to_csv(tmp_path / "found.csv", found).open() as file:
+            rows = [{name: float(row[name]) for name in (*chosen, "value")} for row in csv.DictReader(file)]
+        assert len(rows) == np.prod([len(values) for values in chosen.values()])
+        for row in rows:
+            value = row.pop("value")
+            assert value == place(**row, **rest)
+
+
+def test_arrays_at_the_points_of_a_grid_are_columns_or_a_table_of_their_own():
+    def several(a, b):
+        return {"sum": a + b, "powers": [a, a * a], "square": np.full((2, 2), a)}
+
+    found = saltus.map_over(several, {"a": [2.0, 3.0], "b": [0.0, 1.0]})
+    table = saltus.to_pandas(found)
+    assert table.columns.to_list() == ["a", "b", "sum", "powers_0", "powers_1"]
+    assert table.powers_1.to_list() == [4.0, 4.0, 9.0, 9.0]
+    assert saltus.to_pandas(found, "square").square.to_list() == [2.0] * 8 + [3.0] * 8
+    with pytest.raises(ParameterError, match=r"there is no table 'squares'; did you mean 'square'\?"):
+        saltus.to_pandas(found, "squares")
+    alone = saltus.to_pandas(saltus.map_over(lambda a: np.full((2, 2), a), {"a": [2.0, 3.0]}))
+    assert alone.value.to_list() == [2.0] * 4 + [3.0] * 4
+
+
+def test_sweeps_basins_and_attractors_along_a_parameter_have_a_row_for_each_of_their_cells():
+    sweep = saltus.frequency_sweep(SYSTEM, [0.95, 1.0, 1.05], theta=0.3)
+    table = saltus.to_pandas(sweep)
+    assert len(table) == 6
+    for _, row in table.iterrows():
+        assert row.amplitude == float(sweep.amplitude.sel(direction=row.direction, value=row.value))
+        assert row.hysteresis == int(sweep.hysteresis.sel(value=row.value))
+    basins = saltus.basins_of_attraction(SYSTEM, theta=[-0.5, 0.0, 0.5], velocity=[-0.5, 0.5])
+    table = saltus.to_pandas(basins)
+    assert len(table) == 6
+    for _, row in table.iterrows():
+        assert row.time == float(basins.time.sel(theta=row.theta, velocity=row.velocity))
+    assert saltus.to_pandas(basins, "attractor").cells.to_list() == basins.cells.values.tolist()
+    along = saltus.attractors_along(SYSTEM, "load.frequency", [1.0, 1.05], starts=4)
+    table = saltus.to_pandas(along)
+    assert len(table) == 2 * along.sizes["attractor"]
+    assert list(table.amplitude) == along.amplitude.values.ravel().tolist()
+
+
 def test_a_diagram_has_the_tables_of_its_parts():
     diagram = saltus.bifurcation_diagram(SYSTEM, bounds=(0.85, 0.95), max_period=1, values=[0.9], starts=4, bands=False)
     table = saltus.to_pandas(diagram)

@@ -74,17 +74,25 @@ def result_dataset(
     return xarray.Dataset(variables, coords, known | {"Conventions": "CF-1.8"})
 
 
-# Results whose motions or cells lie on a grid: a row of the table is one of them.
-ON_GRIDS = ("ensemble", "basins", "overturning_spectrum", "stability_chart", "phase_portrait", "fragility")
+# Results whose motions or cells lie on a grid, a row of the table being one of them, and the variable that is given over all of
+# the grid; of those without a name it is the first one.
+ON_GRIDS = {
+    **dict.fromkeys(("ensemble", "overturning_spectrum", "stability_chart", "phase_portrait", "fragility"), ""),
+    "basins": "label",
+    "frequency_sweep": "amplitude",
+    "attractors along a parameter": "",
+}
+MAPPED = "mapped"  # the kind of what `map_over` gives, whose grid has the names that the user chose
 FIRST_PARTS = ("points", "chart", "cells")  # of a tree, which its table shows unless another one is asked for
 
 
 def table_of(data: Any, table: str | None = None) -> pandas.DataFrame:
     """A table of a Dataset or a DataTree: long, a row for each thing of one kind, and never a product of unrelated dimensions.
 
-    A Dataset has a table for each of its dimensions; the first is that of its first variable, or of the whole grid of an
-    ensemble, with a column for each of its axes. A variable with one more dimension has a column for each of its entries, named
-    `variable_entry`. A DataTree has the tables of its parts, `points` first if it has them. Single values have one row.
+    A Dataset has a table for each of its dimensions, and for each of its variables over all dimensions of it; the first is that
+    of its first variable, or of the whole grid of an ensemble, with a column for each of its axes. A variable with one more
+    dimension has a column for each of its entries, named `variable_entry`. A DataTree has the tables of its parts, `points`
+    first if it has them. Single values have one row.
     """
     if getattr(data, "children", None):
         parts = {node.path.strip("/"): node.to_dataset(inherit=False) for node in data.subtree if node.data_vars}
@@ -100,28 +108,40 @@ def table_of(data: Any, table: str | None = None) -> pandas.DataFrame:
 
 def _rows_of(data: Any, table: str | None) -> tuple[str, ...]:
     """The dimensions whose entries are the rows of a table."""
-    dims = [tuple(map(str, variable.dims)) for variable in data.data_vars.values() if variable.dims]
-    known = dict.fromkeys(each[0] for each in dims)
+    variables = {str(name): tuple(map(str, variable.dims)) for name, variable in data.data_vars.items() if variable.dims}
+    first, kind = next(iter(variables.values()), ()), str(data.attrs.get("kind", ""))
+    known = dict.fromkeys(dims[0] for dims in variables.values())
+    if table in known:
+        return (str(table),)
     if table is not None:
-        if table not in known:
-            raise ParameterError(f"there is no table {shown(table)}; {near(str(table), known)}", "table")
-        return (table,)
-    if data.attrs.get("kind") in ON_GRIDS and dims:
-        return dims[0]
-    return dims[0][:1] if dims else ()
+        if table not in variables:
+            also = [*known, *(name for name, dims in variables.items() if len(dims) > 1)]
+            raise ParameterError(f"there is no table {shown(table)}; {near(str(table), also)}", "table")
+        return variables[table]
+    if kind == MAPPED:
+        axes = tuple(dim for dim in first if dim in data.coords)
+        return axes if any(len(dims) <= len(axes) + 1 for dims in variables.values()) else first
+    return variables.get(ON_GRIDS[kind], first) if kind in ON_GRIDS else first[:1]
 
 
 def _long_table(data: Any, over: tuple[str, ...]) -> pandas.DataFrame:
-    """A row for each cell of a grid; variables with further dimensions, such as samples over time, are left out."""
+    """A row for each cell of a grid; variables with further dimensions, such as samples over time, are left out.
+
+    Arrays that a function of the user's own gives at each point of its grid have a column for each of their entries.
+    """
     import pandas
 
     shape = tuple(data.sizes[dim] for dim in over)
     places = np.indices(shape).reshape(len(over), -1)
     columns: dict[str, Any] = {dim: data[dim].values[at] for dim, at in zip(over, places, strict=True)}
     for name, variable in data.variables.items():
-        if name not in columns and set(variable.dims) <= set(over):
+        further = [dim for dim in variable.dims if dim not in over]
+        if name not in columns and not further:
             at = tuple(places[over.index(str(dim))] for dim in variable.dims)
             columns[str(name)] = _in_words(variable)[at] if variable.dims else np.full(places.shape[1], variable.values)
+        elif data.attrs.get("kind") == MAPPED and len(further) == 1 and set(over) < set(variable.dims):
+            entries = variable.transpose(*over, ...).values.reshape(places.shape[1], -1).T
+            columns |= {f"{name}_{entry}": column for entry, column in enumerate(entries)}
     return pandas.DataFrame(columns)
 
 
@@ -160,8 +180,9 @@ def to_pandas(result: Any, table: str | None = None) -> pandas.DataFrame:
     result
         A result, such as a branch, or a Dataset or a DataTree that saltus has made, such as an ensemble or a diagram.
     table
-        Which of its tables: the name of a dimension, such as "special" of a branch, or of a part of a tree, such as "special" or
-        "bands" of a diagram. By default that of its points, or of all motions of an ensemble.
+        Which of its tables: the name of a dimension, such as "special" of a branch or "jump" of a sweep, of a variable, whose
+        table has a row for each of its numbers, or of a part of a tree, such as "special" or "bands" of a diagram. By default
+        that of its points, of all motions of an ensemble, or of all cells of basins or of a grid of one's own.
 
     Raises
     ------
