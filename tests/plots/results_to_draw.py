@@ -80,6 +80,7 @@ RESULTS = {  # by the function that gives it
     "saltus.frequency_sweep": lambda: saltus.frequency_sweep(SYSTEM, [0.9, 1.0, 1.1], theta=0.3),
     "saltus.lyapunov_many": lambda: saltus.lyapunov_many(SYSTEM, {"load.frequency": [0.9, 1.0]}, theta=0.3, periods=64),
     "saltus.lyapunov_spectrum": lambda: saltus.lyapunov_spectrum(SYSTEM, theta=0.3, periods=64),
+    "saltus.map_over": lambda: saltus.map_over(lambda x, y: x * y, {"x": [1.0, 2.0], "y": [0.1, 0.2]}),
     "saltus.phase_portrait": lambda: saltus.phase_portrait(FREE, starts=[(0.5, 0.0)], duration=5.0, samples=50),
     "saltus.response_spectrum": lambda: spectrum(),
     "saltus.search_orbits": lambda: saltus.search_orbits(**ALONG, values=[0.9, 1.0], max_period=1, starts=8),
@@ -125,8 +126,7 @@ WITHOUT = {
     **dict.fromkeys(("saltus.load", "saltus.load_study", "saltus.to_mat", "saltus.plot", "saltus.register"), WRITES),
     **dict.fromkeys(("saltus.to_csv", "saltus.animate", "saltus.page", "saltus.explore"), WRITES),
     "saltus.to_pandas": "gives a table",
-    "saltus.explore": "shows a page that computes",
     **dict.fromkeys(("saltus.overturning_spectrum", "saltus.fragility"), "is drawn in tests/studies/test_overturning.py"),
     **dict.fromkeys(("saltus.save", "saltus.show_progress", "sweep.remove_store", "sweep.status"), WRITES),
-    **dict.fromkeys(("sweep.open_store", "sweep.run", "saltus.map_over"), STORE),
+    **dict.fromkeys(("sweep.open_store", "sweep.run"), STORE),
 }

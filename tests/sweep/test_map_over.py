@@ -66,13 +66,38 @@ def test_what_is_kept_is_not_computed_again_after_a_failure(tmp_path):
     assert not asked
 
 
+def test_other_points_are_computed_where_the_function_raises_at_the_first():
+    with pytest.raises(SweepError, match=r"1 of 3 chunks failed: chunk 0 \(x 0\): ZeroDivisionError") as raised:
+        saltus.map_over(lambda x: 1 / x, {"x": [0.0, 2.0, 4.0]})
+    np.testing.assert_array_equal(raised.value.dataset.value, [np.nan, 0.5, 0.25])
+    with pytest.raises(SweepError, match=r"raised at each of the 2 points: TypeError: .* at the first, x 0.0, y 1.0"):
+        saltus.map_over(lambda x: 1 / x, {"x": [0.0, 2.0], "y": [1.0]})
+
+
+def test_a_number_over_one_name_or_two_is_drawn_and_a_part_of_more():
+    one = saltus.plot(saltus.map_over(lambda x: 2 * x, {"x": [1.0, 2.0, 3.0]}))
+    assert (one.get_xlabel(), one.get_ylabel()) == ("x", "value")
+    np.testing.assert_array_equal(one.lines[0].get_xydata(), [[1.0, 2.0], [2.0, 4.0], [3.0, 6.0]])
+    two = saltus.plot(saltus.map_over(total, GRID))
+    assert (two.get_xlabel(), two.get_ylabel()) == ("x", "y")
+    np.testing.assert_array_equal(np.ravel(two.collections[0].get_array()), [1.0, 2.0, 3.0, 11.0, 12.0, 13.0])
+    named = saltus.plot(saltus.map_over(lambda period: {"stop": 2 * period}, {"period": [1.0, 2.0]}))  # names of ensembles
+    assert (named.get_xlabel(), named.get_ylabel()) == ("period", "stop")
+    three = saltus.map_over(lambda x, y, z: x + y + z, GRID | {"z": [0.5, 0.7]})
+    with pytest.raises(ParameterError, match=r"over one or two dimensions to draw; draw a part, as isel\(x=0\)"):
+        saltus.plot(three)
+    assert saltus.plot(three.isel(z=1)).get_xlabel() == "x"
+
+
 def test_a_store_of_another_text_or_another_grid_is_refused(tmp_path):
     store = tmp_path / "kept.zarr"
     saltus.map_over(lambda x: x + 1, {"x": [1.0]}, store=store)
-    with pytest.raises(ParameterError, match="text has changed"):
+    with pytest.raises(ParameterError, match=r"text of the function .* has changed since .*remove_store"):
         saltus.map_over(lambda x: x + 2, {"x": [1.0]}, store=store)
-    with pytest.raises(ParameterError):
-        saltus.map_over(lambda x: x + 1, {"x": [2.0]}, store=store)
+    saltus.sweep.remove_store(store)
+    saltus.map_over(total, GRID, store=store)
+    with pytest.raises(ParameterError, match="is the store of another plan: axes"):
+        saltus.map_over(total, GRID | {"y": [0.0, 11.0]}, store=store)
 
 
 @pytest.mark.parametrize(

@@ -40,6 +40,7 @@ DRAWINGS: dict[str, Callable[..., Any]] = {
     "frequency_sweep": draw_sweep,
     "lyapunov_many": draw_exponents_along,
     "manifold": draw_manifold,
+    "mapped": draw_ensemble,
     "motion": draw_motion,
     "orbits": draw_search,
     "overturning_spectrum": draw_overturning,

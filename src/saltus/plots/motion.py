@@ -28,6 +28,7 @@ from saltus.plots.conventions import (
     unit_in_brackets,
     varied,
 )
+from saltus.result import MAPPED
 
 if TYPE_CHECKING:
     import xarray
@@ -203,26 +204,29 @@ OWN = ("period", "state", "column")  # dimensions within one motion, and not of 
 def draw_ensemble(
     dataset: Any, quantity: str | None = None, *, ax: Axes | None = None, width: float = LOOK.single_column
 ) -> Axes:
-    """Draw a variable of `simulate_many` over one dimension or two; returns `ax`.
+    """Draw a variable of `simulate_many` or of `map_over` over one dimension or two; returns `ax`.
 
-    By default that is why the motions ended, where not all ended in the same way, and else the first coordinate at the end.
+    By default that is why the motions ended, where not all ended in the same way, and else the first coordinate at the end; of
+    `map_over` it is the first variable.
 
     Raises
     ------
     ParameterError
         A variable that is not there, or that has no dimensions or more than two.
     """
+    mapped = dataset.attrs.get("kind") == MAPPED  # whose names are the user's own, of any meaning
     if quantity is None:
-        several = "stop" in dataset and dataset["stop"].size > 0 and np.ptp(dataset["stop"].values) > 0
+        several = not mapped and "stop" in dataset and dataset["stop"].size > 0 and np.ptp(dataset["stop"].values) > 0
         quantity = "stop" if several else str(next(iter(dataset.data_vars)))
-    if quantity not in dataset or not 1 <= dataset[quantity].ndim <= 2 or set(dataset[quantity].dims) & set(OWN):
-        raise ParameterError(f"the ensemble has no {quantity!r} over one or two dimensions to draw", "quantity")
+    if quantity not in dataset or not 1 <= dataset[quantity].ndim <= 2 or (set(dataset[quantity].dims) & set(OWN) and not mapped):
+        part = f"; draw a part, as isel({next(iter(dataset.sizes))}=0) gives one" if len(dataset.sizes) > 2 else ""
+        raise ParameterError(f"the result has no {shown(quantity)} over one or two dimensions to draw{part}", "quantity")
     values = dataset[quantity]
     axes = dict(varied(dataset, str(dim)) for dim in values.dims)
     ax = axes_or_new(ax, width, 0.75 * width)
-    if quantity == "stop":
+    if quantity == "stop" and not mapped:
         return _draw_stops(ax, values, axes)
-    label = f"{symbol_of(quantity)}{unit_in_brackets(values)}"
+    label = quantity.replace("_", " ") if mapped else f"{symbol_of(quantity)}{unit_in_brackets(values)}"
     names = list(axes)
     ax.set_xlabel(names[0])
     if len(names) == 1:

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.checks import Numbers, answered, check_count
-from saltus.errors import ParameterError, shown
+from saltus.errors import ParameterError, SweepError, shown
 from saltus.progress import Progress, silent
-from saltus.result import provenance
+from saltus.result import MAPPED, provenance
 from saltus.sweep.execution import check_run, run
 from saltus.sweep.plan import Plan, Variable, axis_values
 from saltus.sweep.store_files import METADATA
@@ -97,7 +97,7 @@ def map_over(
         The function returns no numbers, or other shapes than before; the store is of another function or another grid; the
         function cannot be sent to processes.
     SweepError, SweepInterrupted
-        As for `saltus.sweep.run`; what was computed is kept.
+        As for `saltus.sweep.run`; what was computed is kept. Or the function raises at every point.
 
     Examples
     --------
@@ -116,12 +116,14 @@ def map_over(
     path = check_run(store, workers, scheduler, progress)
     axes = {name: axis_values(name, values) for name, values in grid.items()}
     name = getattr(function, "__qualname__", type(function).__name__)
+    text = _text_digest(function)
+    _refuse_other_text(path, name, text)
     call = function if workers is None and scheduler is None else _sent(function, scheduler is not None)
     plan = FunctionPlan(
         function=f"{__name__}:values_at",
-        arguments={"function": name, "text": _text_digest(function)},
-        variables=_known_variables(path) or _variables(_answer(function, {n: v[0].item() for n, v in axes.items()})),
-        attrs={"title": f"{name} over a grid, computed by saltus", "kind": "mapped"} | provenance(None),
+        arguments={"function": name, "text": text},
+        variables=_known_variables(path) or _variables(_first_answer(function, axes)),
+        attrs={"title": f"{name} over a grid, computed by saltus", "kind": MAPPED} | provenance(None),
         axes=axes,
         chunk=dict.fromkeys(axes, 1) | dict(chunk or {}),
         call=call,
@@ -142,9 +144,30 @@ def values_at(arguments: Mapping[str, Any], block: Mapping[str, np.ndarray]) -> 
     return {name: np.stack([a[name] for a in answers]).reshape(shape + first.shape) for name, first in answers[0].items()}
 
 
+def _first_answer(function: Callable[..., Any], axes: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """What the function returns at the first point at which it does not raise."""
+    raised: list[tuple[dict[str, float], Exception]] = []
+    for values in itertools.product(*(axis.tolist() for axis in axes.values())):
+        point = dict(zip(axes, values, strict=True))
+        try:
+            answer = function(**point)
+        except Exception as error:  # of whatever kind: the plan reports it as it does that of any other point
+            raised.append((point, error))
+        else:
+            return _arrays(answer, point)
+    point, first = raised[0]
+    where = ", ".join(f"{name} {shown(value)}" for name, value in point.items())
+    sentence = f"the function raised at each of the {len(raised)} points: {type(first).__name__}: {first} at the first, {where}"
+    raise SweepError(sentence) from first
+
+
 def _answer(function: Callable[..., Any], point: Mapping[str, float]) -> dict[str, np.ndarray]:
     """What the function returns at a point, as arrays by name."""
-    answer = function(**point)
+    return _arrays(function(**point), point)
+
+
+def _arrays(answer: Any, point: Mapping[str, float]) -> dict[str, np.ndarray]:
+    """What the function returned at a point, as arrays by name."""
     named = dict(answer) if isinstance(answer, Mapping) and not hasattr(answer, "data_vars") else {VALUE: answer}
     arrays = {str(name): np.asarray(value) for name, value in named.items()}
     for name, array in arrays.items():
@@ -168,6 +191,18 @@ def _known_variables(path: Path | None) -> dict[str, Variable]:
         return {}
     known = read_plan(path)["variables"].items()
     return {name: Variable(dtype=each["dtype"], extra=tuple(map(tuple, each["extra"]))) for name, each in known}
+
+
+def _refuse_other_text(path: Path | None, name: str, text: str) -> None:
+    """Refuse a store that was begun with another text of the function."""
+    if path is None or not (path / METADATA).is_file():
+        return
+    if read_plan(path)["arguments"].get("text", text) != text:
+        raise ParameterError(
+            f"the text of the function {name} has changed since {path} was begun: name another store, or remove this one "
+            "(saltus.sweep.remove_store) to compute all points anew",
+            "store",
+        )
 
 
 def _text_digest(function: Callable[..., Any]) -> str:
