@@ -150,6 +150,21 @@ def test_what_a_notebook_shows_is_a_table_in_html(branch, motion):
         assert word in html
 
 
+def test_a_notebook_shows_each_attractor_and_says_that_a_model_has_no_margins():
+    stops = saltus.System(
+        model=saltus.TwoStops(left=-5.0, right=5.0, damping=1.0), load=saltus.Load(frequency=1.0, force=saltus.Harmonic(0.5))
+    )
+    html = saltus.find_attractors(stops, starts=4, window=((-0.5, 0.5), (-0.5, 0.5)))._repr_html_()
+    for word in ("share of the starts", "period 1", "100 +- 0 %", "orbit of period 1: residual", "0.5"):
+        assert word in html  # at resonance the amplitude is 0.5 / damping
+    assert "the model has no margins" in saltus.simulate(stops, x=0.1, periods=1).validity._repr_html_()
+
+
+def test_an_end_of_a_branch_is_shown_as_its_sentence(branch):
+    assert repr(branch.ends) == f"({', '.join(f'End({str(end)!r})' for end in branch.ends)})"
+    assert "{" not in repr(branch.ends)
+
+
 def test_progress_in_a_notebook_is_one_line_that_is_written_over(monkeypatch, capsys):
     shown, updates = [], []
 

@@ -187,6 +187,7 @@ def test_a_gap_that_is_linear_in_other_words_is_the_same_gap():
     assert other.impacts.time == pytest.approx(one.impacts.time, abs=1e-9)
 
 
+@dataclass(frozen=True)
 class Wall(OneContactModel):
     """A wall at x = 0 whose reset is that of a passage."""
 

@@ -26,7 +26,7 @@ def bounce(self, t, velocity, side, load, impact):
 
 def made(base, **parts):
     """A model of one coordinate x with these parts."""
-    return type("Own", (base,), {"coordinates": ("x",), **parts})()
+    return dataclass(type("Own", (base,), {"coordinates": ("x",), **parts}))()
 
 
 FLOOR = (Contact(name="floor", coordinate="x"),)
@@ -76,6 +76,55 @@ FLOOR = (Contact(name="floor", coordinate="x"),)
 def test_a_model_that_cannot_work_is_refused_when_a_system_is_made_of_it(model, sentence):
     with pytest.raises(ParameterError, match=sentence):
         System(model=model)
+
+
+def with_two(mass, force=lambda self, t, q, velocity, load: (-q[0], -q[1])):
+    return made(ContactModel, coordinates=("x", "y"), mass_matrix=lambda self, q: mass, force=force)
+
+
+@dataclass(frozen=True, kw_only=True)
+class NamedGap(ContactModel):
+    gap: float = 0.1
+    coordinates = ("x",)
+    force = pulled
+
+
+class NoDataclass(ContactModel):
+    stiffness: float = 1.0
+    coordinates = ("x",)
+    force = pulled
+
+
+UNIT = [[1.0, 0.0], [0.0, 1.0]]
+
+
+@pytest.mark.parametrize(
+    ("model", "sentence"),
+    [
+        (NamedGap(), "NamedGap has a number named gap, which is the name of a method of saltus.OneContactModel: rename it"),
+        (NoDataclass(), r"NoDataclass is no dataclass, so stiffness would be no parameter: write @dataclass\(frozen"),
+        (with_two(UNIT, lambda self, t, q, v, load: (1.0, 2.0, 3.0)), "force must return 2 numbers, for x, y, got 3 numbers"),
+        (with_two(UNIT, lambda self, t, q, v, load: -q[0]), "force must return 2 numbers, for x, y, got a number"),
+        (made(ContactModel, force=lambda self, t, q, v, load: (q, v)), "force must return a number, for x, got 2 numbers"),
+        (with_two([[1.0]]), "mass_matrix must return 2 rows of 2 numbers, for x, y, got 1 row of 1 number$"),
+        (with_two([[1.0], [0.0, 1.0]]), "mass_matrix must return 2 rows of 2 numbers, for x, y, got 2 rows of 1 and 2 numbers"),
+        (with_two(2.0), "mass_matrix must return 2 rows of 2 numbers, for x, y, got a number"),
+        (with_two([[1.0, 0.1], [0.2, 1.0]]), "mass_matrix must be symmetric, got 0.1 for x, y and 0.2 for y, x"),
+    ],
+)
+def test_what_a_newcomer_gets_wrong_in_a_model_is_said_when_a_system_is_made_of_it(model, sentence):
+    with pytest.raises(ParameterError, match=sentence):
+        System(model=model)
+
+
+def test_a_model_without_numbers_needs_no_decorator():
+    system = System(model=type("Own", (Model,), {"coordinates": ("x",), "acceleration": fall})())
+    assert system.to_dict()["model"] == {"type": "Own"}
+    assert saltus.simulate(system, x=0.0, duration=2.0).x == pytest.approx(-2.0, rel=1e-14)
+
+
+def test_a_mass_matrix_that_is_symmetric_but_for_rounding_is_taken():
+    System(model=with_two([[1.0, 0.1 + 0.2], [0.3, 1.0]]))
 
 
 def test_a_misspelt_channel_is_refused_when_a_system_is_made():

@@ -13,6 +13,7 @@ import numpy as np
 from saltus.attractors.stroboscopic_section import is_constant
 from saltus.checks import check_count
 from saltus.flow import Ending, extrema_names, state_names
+from saltus.notebook import html_table, rows_table
 from saltus.orbits import PeriodicOrbit
 from saltus.result import Result, provenance
 from saltus.systems import System, Window
@@ -289,6 +290,18 @@ class Attractors(Result):
     def to_xarray(self) -> xarray.Dataset:
         """A row for each attractor: kind, periods, fraction and its error, extrema, multipliers, points at phase 0."""
         return attractors_dataset(self)
+
+    def _repr_html_(self) -> str:
+        members = self.members
+        columns = {
+            "attractor": [m.label for m in members],
+            "kind": [f"period {m.period}" if m.orbit is not None else str(m.kind) for m in members],
+            "amplitude": [m.amplitude for m in members],
+            "share of the starts": [f"{100 * m.fraction:.3g} +- {100 * m.error:.2g} %" if m.of else "" for m in members],
+            "evidence": [m.evidence for m in members],
+        }
+        facts = {"starts": len(self.states), "undecided": self.undecided} | self._facts()
+        return html_table("Attractors", facts) + rows_table(columns)
 
     def __repr__(self) -> str:
         lines = "".join(f"\n  {member!r}" for member in self.members)

@@ -55,6 +55,9 @@ class End:
     kind: str = ""
     detail: str = ""
 
+    def __repr__(self) -> str:
+        return f"End({str(self)!r})"
+
     def __str__(self) -> str:
         return str(self.reason.value.format(parameter=self.parameter, kind=self.kind, detail=self.detail))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import itertools
 import math
 from collections.abc import Mapping
 from types import FunctionType
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import ParameterError, SaltusError, shown
-from saltus.systems.contact_model import MOST_CONTACTS, MOST_FRICTIONS, Contact, ContactModel, Surface
+from saltus.systems.contact_model import MOST_CONTACTS, MOST_FRICTIONS, Contact, ContactModel, Surface, sides_for
 from saltus.systems.gap_coordinates import InGapCoordinates
 from saltus.systems.impact_laws import ImpactLaw
 from saltus.systems.load import DeclaredLoad, Load
@@ -22,7 +23,8 @@ OWN_PARTS = {
     OneContactModel: ("sides", "gap", "reset", "inelastic_factor"),
     ContactModel: ("contacts", "frictions", "surfaces", "force", "mass_matrix", "normal_forces", "transfers"),
 }
-OFF_CONTACT = 1e-9  # the largest gap at the contact, relative to its rate, that may be rounding; an error of a model is larger
+# What may be rounding in a gap at the contact, relative to its rate, and in entries of a mass matrix; a mistake is larger.
+MODEL_ROUNDING = 1e-9
 PROBE = (0.37, 0.21, 0.13)  # time, coordinate and velocity at which a model's answers are counted: any numbers would do
 
 
@@ -56,6 +58,7 @@ _known = set[type[Model]]()  # classes of which one model has passed, as systems
 
 def _check_class(kind: type[Model]) -> None:
     """Refuse a class that lacks its equation of motion, or has parts that only another class of models has."""
+    _check_fields(kind)
     for base, parts in OWN_PARTS.items():
         given = [name for name in parts if getattr(kind, name, ()) not in ((), getattr(Model, name, None))]
         if given and not issubclass(kind, base):
@@ -73,6 +76,26 @@ def _check_class(kind: type[Model]) -> None:
         for name, function in vars(base).items():
             if isinstance(function, FunctionType) and not name.startswith("_"):
                 _check_arguments(kind, name, function)
+
+
+def _check_fields(kind: type[Model]) -> None:
+    """Refuse numbers of a class that is no dataclass, and those whose names are those of a contract's methods."""
+    fields: dict[str, Any] = getattr(kind, "__dataclass_fields__", {})
+    given = {name for name, what in vars(kind).get("__annotations__", {}).items() if "ClassVar" not in str(what)}
+    if lost := sorted(given - fields.keys()):
+        raise ParameterError(
+            f"{kind.__name__} is no dataclass, so {', '.join(lost)} would be no parameter: write @dataclass(frozen=True, "
+            f"kw_only=True) above class {kind.__name__}",
+            "model",
+        )
+    for base in (Model, OneContactModel, ContactModel):
+        for name in fields:
+            if isinstance(vars(base).get(name), FunctionType):
+                raise ParameterError(
+                    f"{kind.__name__} has a number named {name}, which is the name of a method of saltus.{base.__name__}: "
+                    f"rename it, such as {name}_size",
+                    f"model.{name}",
+                )
 
 
 def _check_arguments(kind: type[Model], name: str, function: FunctionType) -> None:
@@ -100,7 +123,7 @@ def check_contact(model: OneContactModel, impact: ImpactLaw) -> None:
         at = float(model.gap(point, side))
         if rate == 0.0:
             raise ParameterError(f"{name}.gap must depend on the coordinate, such as side * (x - d)", "model")
-        if abs(at) > OFF_CONTACT * abs(rate):
+        if abs(at) > MODEL_ROUNDING * abs(rate):
             raise ParameterError(
                 f"{name}.gap must be 0 at {name}.contact = {point:g}, got {at:g} on side {side}; give both", "model"
             )
@@ -153,6 +176,7 @@ def check_contact_model(model: ContactModel) -> bool:
             if a is not b and a.coordinate == b.coordinate and not (a.sign != b.sign and b.gap(a.position) > 0.0):
                 raise ParameterError(f"the contacts {a.name!r} and {b.name!r} leave {a.coordinate} no room between them", "model")
     _check_frictions(model, [contact.coordinate for contact in contacts])
+    _check_mass(model)
     return any(not isinstance(part.coordinate, str) for part in parts)
 
 
@@ -169,6 +193,42 @@ def _check_frictions(model: ContactModel, taken: list[Any]) -> None:
             pair = f"kinetic = {float(friction.kinetic):g} and static = {float(friction.most):g}"
             raise ParameterError(f"{where} must have 0 <= kinetic <= static, got {pair}", "model")
         taken.append(friction.coordinate)
+
+
+def _check_mass(model: ContactModel) -> None:
+    """Refuse a mass matrix of another size than the coordinates have, or one that is not symmetric."""
+    names, kind = model.coordinates, type(model)
+    size = len(names)
+    if kind.mass_matrix is ContactModel.mass_matrix:
+        return
+    found = _asked(model, "mass_matrix", PROBE[1] if size == 1 else tuple(PROBE[1] / (1 + i) for i in range(size)))
+    if found is None:
+        return
+    if _size_of(found) != ("a number" if size == 1 else f"{size} rows of {size} numbers"):
+        wanted = "a number, as there is one coordinate" if size == 1 else f"{size} rows of {size} numbers, for {', '.join(names)}"
+        raise ParameterError(f"{kind.__name__}.mass_matrix must return {wanted}, got {_size_of(found)}", "model")
+    for i, j in itertools.combinations(range(size), 2):
+        a, b = float(found[i][j]), float(found[j][i])
+        if abs(a - b) > MODEL_ROUNDING * max(abs(a), abs(b)):
+            raise ParameterError(
+                f"{kind.__name__}.mass_matrix must be symmetric, got {a:g} for {names[i]}, {names[j]} and {b:g} for "
+                f"{names[j]}, {names[i]}",
+                "model",
+            )
+
+
+def _size_of(found: Any) -> str:
+    """The size of what a method returns, in words."""
+    if not _is_row(found):
+        return "a number"
+    rows = {len(row) if _is_row(row) else 0 for row in found}
+    if rows == {0}:
+        return f"{len(found)} number{'s' * (len(found) != 1)}"
+    return f"{len(found)} row{'s' * (len(found) != 1)} of {' and '.join(map(str, sorted(rows)))} number{'s' * (rows != {1})}"
+
+
+def _is_row(found: Any) -> bool:
+    return isinstance(found, (tuple, list)) or (isinstance(found, np.ndarray) and found.ndim > 0)
 
 
 def _check_sum(model: ContactModel, contact: Contact | Surface) -> None:
@@ -215,6 +275,15 @@ def _probe(model: Model) -> None:
     """Refuse a model whose equations fail at a state by a mistake of its author, or have other sizes than its coordinates."""
     size, (t, q, v), load = len(model.coordinates), PROBE, DeclaredLoad(Load(frequency=1.0), model)
     state: tuple[Any, Any] = (q, v) if size == 1 else ((q,) * size, (v,) * size)
+    single = all(isinstance(each.coordinate, str) for each in getattr(model, "surfaces", ()))
+    if isinstance(model, ContactModel) and single and type(model).force is not ContactModel.force:
+        pushed = _asked(model, "force", t, *state, load, *sides_for(model, t, state[0], load))
+        if pushed is not None and _size_of(pushed) != ("a number" if size == 1 else f"{size} numbers"):
+            wanted = "a number" if size == 1 else f"{size} numbers"
+            names = ", ".join(model.coordinates)
+            raise ParameterError(
+                f"{type(model).__name__}.force must return {wanted}, for {names}, got {_size_of(pushed)}", "model"
+            )
     for side in model.every_side:
         found = _asked(model, "acceleration", t, *state, side, load)
         count = len(found) if isinstance(found, (tuple, list)) else 1

@@ -204,7 +204,7 @@ def to_dict(part: Any) -> Any:
     if isinstance(part, Record):
         fields = {"time": part.time.tolist(), "value": part.value.tolist(), "quantity": part.quantity}
         return {**fields, "scale": part.scale, **({"source": part.source} if part.source else {})}
-    fields = {f.name: getattr(part, f.name) for f in dataclasses.fields(part)}
+    fields = {name: getattr(part, name) for name in _fields_of(type(part))}
     fields = {name: value for name, value in fields.items() if value is not None}
     return fields if isinstance(part, Signal) and not isinstance(part, Pulse) else {"type": type(part).__name__, **fields}
 

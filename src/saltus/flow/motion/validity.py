@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from saltus.flow.kernel.layout import LOSSLESS
-from saltus.notebook import rows_table
+from saltus.notebook import html_table, rows_table
 from saltus.systems import System, energy_gain
 
 STEP_SAMPLES = 12  # samples in each step to find changes of sign; a step is shorter than the time scale of a margin
@@ -87,6 +87,8 @@ class Validity:
         return not self.gains and all(time is None for time in self.first.values())
 
     def _repr_html_(self) -> str:
+        if not self.first and not self.gains:
+            return html_table("Validity", {"margins": str(self)})
         rows = {name: "respected" if t is None else f"passed first at {t:.6g}" for name, t in self.first.items()}
         shares = [f"{100 * self.share[name]:.3g} %" for name in self.first]
         gained = {name: self.gain(name) for name in self.gains}
