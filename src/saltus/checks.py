@@ -274,17 +274,20 @@ def as_numbers(given: Any, name: str | None = None) -> np.ndarray:
         return np.empty(0)
 
 
-def check_axis(name: str, values: Any) -> np.ndarray:
-    """The numbers along an axis of a grid.
+def check_axis(name: str, values: Any, either_way: bool = False) -> np.ndarray:
+    """The numbers along an axis of a grid, which may also fall if they may go `either_way`.
 
     Raises
     ------
     ParameterError
-        Anything but a list of finite increasing numbers; the error has the name.
+        Anything but a list of finite increasing numbers, or of falling ones; the error has the name.
     """
     axis = np.atleast_1d(as_numbers(values, name))
-    if axis.ndim != 1 or not axis.size or not (np.abs(axis) <= LIMITS.value).all() or not (np.diff(axis) > 0).all():
-        raise ParameterError(f"{name} must be numbers that rise, each above the one before, got {shown(values)}", name)
+    falls = either_way and axis.ndim == 1 and axis.size > 1 and axis[0] > axis[-1]
+    steps = np.diff(-axis if falls else axis)
+    if axis.ndim != 1 or not axis.size or not (np.abs(axis) <= LIMITS.value).all() or not (steps > 0).all():
+        order = "rise, or all fall, each beyond" if either_way else "rise, each above"
+        raise ParameterError(f"{name} must be numbers that {order} the one before, got {shown(values)}", name)
     return axis
 
 

@@ -148,6 +148,7 @@ def test_texts_are_saved_as_they_are(tmp_path):
         ("a.nc", 5, "result must be"),
         ("", "text", "path must name a file"),
         ("file/a.txt", "text", "cannot be written"),
+        ("a.xyz", "motion", "must end in .nc, as a result becomes netCDF; `to_csv` writes tables"),
         ("a.xyz", "figure", "must end in .png, .pdf or .svg"),
         (5, "text", "path must"),
     ],
@@ -156,4 +157,4 @@ def test_what_cannot_be_saved_is_refused(tmp_path, monkeypatch, motion, path, re
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").touch()
     with pytest.raises(ParameterError, match=said):
-        saltus.save(path, saltus.plot(motion) if result == "figure" else result)
+        saltus.save(path, {"figure": saltus.plot(motion), "motion": motion}.get(result, result))

@@ -148,6 +148,11 @@ def test_the_power_of_an_orbit_is_split_between_dashpot_and_stops():
         np.sum((1 - 0.7**2) * speeds**2 / 2) / orbit.duration, rel=1e-9
     )
     assert power["load.force"] == pytest.approx(saltus.mean_dissipated_power(orbit), rel=1e-10)
+    parts = energies(orbit).power
+    lost = parts[parts.part.str.startswith("impact")].sum()
+    assert float(lost) == pytest.approx(power["impact.left"] + power["impact.right"], rel=1e-12)
+    parts = energies(saltus.simulate(system.with_({"load.force.amplitude": 0.01}), x=0.0, periods=2)).power
+    assert float(parts[parts.part.str.startswith("impact")].sum()) == 0.0  # a stop that is not struck has no part
 
 
 @dataclass(frozen=True)

@@ -181,7 +181,10 @@ x = 0.1
     ("change", "sentence"),
     [
         ({"values": [1.0]}, "values must be two or more"),
-        ({"values": [1.2, 1.0, 1.1]}, "must be numbers that rise"),
+        ({"values": [1.2, 1.0, 1.1]}, r"must be numbers that rise, or all fall, .* got \[1.2, 1.0, 1.1\]"),
+        ({"values": [1.0, 1.2, 1.1]}, r"must be numbers that rise, or all fall, .* got \[1.0, 1.2, 1.1\]"),
+        ({"values": [[1.0, 1.1]]}, "must be numbers that rise, or all fall"),
+        ({"values": []}, "must be numbers that rise, or all fall"),
         ({"functions": {"power": 3.0}}, "functions must be functions of a motion, and 'power' is 3.0"),
         ({"functions": {"state": lambda motion: motion.final_state}}, "functions must return a number, and 'state' returned"),
         ({"path": "load.force"}, "not a number"),

@@ -113,7 +113,7 @@ def save(path: str | Path, result: Any, *, title: str | None = None) -> Path:
     Parameters
     ----------
     path
-        The file; ".nc" is appended to that of a result, and ".png" to that of a picture, if it has no suffix.
+        The file; that of a result ends in ".nc". If there is no suffix, ".nc" is appended for a result, ".png" for a picture.
     result
         A Dataset, a DataTree, a result with `to_xarray`, such as a motion or a branch; a Matplotlib figure, or axes, such as
         `plot` returns; a text, or bytes.
@@ -141,7 +141,11 @@ def save(path: str | Path, result: Any, *, title: str | None = None) -> Path:
         if isinstance(data, (str, bytes)):
             return files.write_bytes(path, data.encode() if isinstance(data, str) else data)
         if hasattr(data, "data_vars") and hasattr(data, "attrs"):
-            return files.write_dataset(path if path.suffix else path.with_suffix(".nc"), _with_version(data))
+            path = path if path.suffix else path.with_suffix(".nc")
+            if path.suffix.lower() != ".nc":
+                others = "`to_csv` writes tables, `to_mat` files for MATLAB; a picture, as of `plot`, ends in .png, .pdf or .svg"
+                raise ParameterError(f"{path} must end in .nc, as a result becomes netCDF; {others}", "path")
+            return files.write_dataset(path, _with_version(data))
         figure = _figure_of(data)
         if figure is None:
             raise ParameterError(

@@ -203,8 +203,9 @@ def energies(of: Followed, *, periods: int | None = None) -> xarray.Dataset:
     xarray.Dataset
         Over `part`: `energy` and `power`, the energy over the time, and the `role`: supplied (`load.force`, `load.together` of
         channels that act on one another, `ground.belt`), dissipated (`damping`, `friction.belt`, `impact.left`; `impact` of a
-        single contact) or stored (`kinetic`, `potential`). The attribute `defect` is what is missing in the sum by rounding,
-        `duration` is D. Of loads on a metainterface the unit is that of K2.
+        single contact) or stored (`kinetic`, `potential`). A contact that is not struck has no part: what all take together is
+        the sum where `part.str.startswith("impact")`, of no parts 0. The attribute `defect` is what is missing in the sum by
+        rounding, `duration` is D. Of loads on a metainterface the unit is that of K2.
 
     Raises
     ------

@@ -68,11 +68,11 @@ class SweepRequest:
         if self.system.load.frequency is None:
             raise ParameterError("a sweep needs a load with a frequency; give the Load one", "load.frequency")
         check_path(self.system, self.path)
-        given = np.asarray(self.values)
-        falling = given.ndim == 1 and given.size > 1 and bool(given[0] > given[1])
-        grid = check_axis("values", given[::-1] if falling else self.values)
+        given = check_axis("values", self.values, either_way=True)
+        falling = bool(given[0] > given[-1])
+        grid = given[::-1] if falling else given
         if grid.size < 2:
-            raise ParameterError(f"values must be two or more that increase or that fall, got {self.values!r}", "values")
+            raise ParameterError(f"values must be two or more that increase or that fall, got {shown(self.values)}", "values")
         for name, function in (self.functions or {}).items():
             if not callable(function):
                 raise ParameterError(f"functions must be functions of a motion, and {name!r} is {shown(function)}", "functions")
