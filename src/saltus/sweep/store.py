@@ -27,9 +27,7 @@ if TYPE_CHECKING:
 
 
 LONGEST_NAME_OF_A_FILE = 200  # bytes: file systems allow 255, and half-written files have longer names
-BEGIN_ANEW = (
-    "name another store, or remove this one to begin anew (`saltus.sweep.remove_store`, or `saltus run --fresh` of a study)"
-)
+BEGIN_ANEW = "name another one, or begin anew (`sweep.remove_store`, `saltus run --fresh`)"
 
 log = logging.getLogger("saltus.sweep")
 
