@@ -30,7 +30,6 @@ rest = dict.fromkeys(Chain.coordinates, 0.0) | {"velocity": (0.0,) * COUNT}
 free = saltus.simulate(saltus.System(model=Chain()), **{**rest, "x1": 0.1}, duration=5.0)  # too short to reach the stop
 rates = np.block([[np.zeros((COUNT, COUNT)), np.eye(COUNT)], [-K, -0.05 * K]])
 error = np.abs(free.final_state - expm(5.0 * rates) @ (0.1 * np.eye(2 * COUNT)[0])).max()
-
 load = saltus.Load(frequency=0.28, force=saltus.Harmonic(amplitude=0.05))
 motion = saltus.simulate(saltus.System(model=Chain(), load=load, impact=saltus.NewtonImpact(e=0.6)), **rest, periods=100)
 times = np.linspace(motion.time - 60.0, motion.time, 1500)

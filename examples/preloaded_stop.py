@@ -20,7 +20,6 @@ class PreloadedStop(saltus.OneContactModel):
     preload: float = 0.5
     contact: float = 1.0  # d
     damping: float = 0.1
-
     coordinates = ("x",)
     channels = ("force",)
 
