@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 LONGEST_NAME_OF_A_FILE = 200  # bytes: file systems allow 255, and half-written files have longer names
-BEGIN_ANEW = "name another one, or begin anew (`sweep.remove_store`, `saltus run --fresh`)"
+BEGIN_ANEW = "name another store, or begin anew (`sweep.remove_store`, `saltus run --fresh`)"
 
 log = logging.getLogger("saltus.sweep")
 
