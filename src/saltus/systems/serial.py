@@ -204,9 +204,10 @@ def to_dict(part: Any) -> Any:
     if isinstance(part, Record):
         fields = {"time": part.time.tolist(), "value": part.value.tolist(), "quantity": part.quantity}
         return {**fields, "scale": part.scale, **({"source": part.source} if part.source else {})}
-    fields = {name: getattr(part, name) for name in _fields_of(type(part))}
+    kind: Any = type(part)
+    fields = {name: getattr(part, name) for name in _fields_of(kind)}
     fields = {name: value for name, value in fields.items() if value is not None}
-    return fields if isinstance(part, Signal) and not isinstance(part, Pulse) else {"type": type(part).__name__, **fields}
+    return fields if isinstance(part, Signal) and not isinstance(part, Pulse) else {"type": kind.__name__, **fields}
 
 
 def from_dict(kind: str, data: Any) -> Any:
