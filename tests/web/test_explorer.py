@@ -239,3 +239,21 @@ def test_a_click_in_the_frame_reaches_python_and_the_view_can_be_closed(notebook
     assert heard["x_velocity"] != 0
     assert notebook.evaluate("model.listeners()") == 4
     assert notebook.evaluate("(end(), [model.listeners(), document.querySelectorAll('iframe').length])") == [0, 0]
+
+
+class Backlash(saltus.ContactModel):
+    """A mass with another stiffness beyond a surface."""
+
+    coordinates = ("x",)
+    surfaces = (saltus.Surface(name="stop", coordinate="x", position=0.1),)
+
+    def force(self, t, q, velocity, load, sides):
+        return -q - (1.0 + sides.stop) * (q - 0.1)
+
+
+@pytest.mark.parametrize("show", [saltus.page, saltus.explore])
+def test_surfaces_which_a_page_does_not_follow_are_refused_by_both_doors(show, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(saltus.ParameterError, match="a page follows no surfaces so far, and Backlash has some"):
+        show(saltus.System(model=Backlash()), x=0.0)
+    assert list(tmp_path.iterdir()) == []

@@ -16,8 +16,8 @@ from saltus.systems import System, numbers
 # They stand in a sentence for the value, for the value in six digits, and for another number that bounds it, in six digits.
 MARK, SHORT, OTHER = "{value}", "{short}", "{other}"
 # Sizes of the values that are tried, odd in their digits so that no sentence has them by chance; Python's hint at degrees begins
-# and ends near the second and the fifth of them.
-TRIED = (0.0070173, 3.2000173, 7.0170173, 70.170173, 360.00173, 7017.0173, 7.0170173e6, 7.0170173e12)
+# and ends near the second and the fifth of them. No number may be as large as the last one.
+TRIED = (0.0070173, 3.2000173, 7.0170173, 70.170173, 360.00173, 7017.0173, 7.0170173e6, 7.0170173e12, 7.0170173e20, 7.0170173e105)
 TRIED_WHOLE = (173.0, 7017.0, 7017017.0)
 
 

@@ -77,9 +77,7 @@ def page(
     >>> file.stat().st_size < 300_000
     True
     """
-    check_system(system, "page", several_contacts=True)
-    if system.model.surfaces:
-        raise ParameterError(f"a page follows no surfaces so far, and {type(system.model).__name__} has some", "system")
+    _check(system, "page")
     file = Path(f"{type(system.model).__name__}.html" if path is None else path)
     if file.suffix.lower() not in (".html", ".htm"):
         raise ParameterError(f"path must be the name of a page, such as 'study.html', got {str(path)!r:.80}", "path")
@@ -121,7 +119,7 @@ def explore(
     >>> explorer.system == system, explorer.state["theta"]
     (True, 0.3)
     """
-    check_system(system, "explore", several_contacts=True)
+    _check(system, "explore")
     motion = _motion(system, velocity, coordinates, {"periods": periods, "duration": duration}, tol, time)
     return Explorer(system, results, motion, title)
 
@@ -213,6 +211,13 @@ class Explorer:
 
     def _display_(self) -> Any:  # marimo asks for it
         return self.widget
+
+
+def _check(system: System, function: str) -> None:
+    """Refuse a system that a page cannot follow."""
+    check_system(system, function, several_contacts=True)
+    if system.model.surfaces:
+        raise ParameterError(f"a page follows no surfaces so far, and {type(system.model).__name__} has some", "system")
 
 
 def _motion(

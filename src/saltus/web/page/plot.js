@@ -251,7 +251,7 @@ export class Painter {
   axes() {
     const { ctx, palette, box } = this;
     const [x0, x1, y0, y1] = this.window;
-    const along = ticks(x0, x1, clamp(Math.round(box.width / 75), 2, 10));
+    const along = ticks(x0, x1, clamp(Math.round(box.width / 75), 3, 10));
     const up = ticks(y0, y1, clamp(Math.round(box.height / 42), 2, 9));
     ctx.fillStyle = palette.ink;
     ctx.strokeStyle = palette.faint;
