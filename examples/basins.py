@@ -8,7 +8,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import saltus
-from saltus.attractors import basins_of_attraction, find_attractors, stable_manifold, uncertainty_exponent
+from saltus import basins_of_attraction, find_attractors, stable_manifold
+from saltus.attractors import uncertainty_exponent
 from saltus.plots import draw_basins
 
 system = saltus.System(

@@ -10,7 +10,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import saltus
-from saltus.orbits import doubling_cascade, switch_branch
+from saltus import doubling_cascade
+from saltus.orbits import switch_branch
 
 FEIGENBAUM = 4.669201609
 system = saltus.System(

@@ -12,8 +12,8 @@ import numpy as np
 import xarray as xr
 
 import saltus
+from saltus import response_spectrum
 from saltus.orbits import orbits_of
-from saltus.studies import response_spectrum
 
 system = saltus.System(
     model=saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1),

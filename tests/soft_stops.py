@@ -8,7 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from saltus.systems import Harmonic, Load, OneContactModel, System, VelocityReduction
+from saltus import OneContactModel
+from saltus.systems import Harmonic, Load, System, VelocityReduction
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -59,7 +59,7 @@ def made():
     branch = saltus.continue_orbit(saltus.find_orbit(SYSTEM, theta=0.1), "load.frequency", (0.8, 1.2))
     fold = next(s for s in branch.special if s.kind == orbits.SpecialKind.LP)
     curve = saltus.continue_special(fold, "load.vertical", (-0.51, -0.49), first_bounds=(0.8, 1.2), most_points=10)
-    chart = studies.stability_chart(SYSTEM, horizontal=[0.1, 0.2], vertical=[-0.5, -0.4], starts=2, periods=60)
+    chart = saltus.stability_chart(SYSTEM, horizontal=[0.1, 0.2], vertical=[-0.5, -0.4], starts=2, periods=60)
     many = saltus.simulate_many(SYSTEM, theta=[0.1, 0.3], periods=4, last=3)
     branch.to_xarray()  # computes defects, which are then kept
     record = saltus.Measurement(start={"theta": 0.3}, time=[0.5, 1.0], values={"theta": [0.3, 0.2]}, sigma=0.1)

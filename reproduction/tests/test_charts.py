@@ -12,10 +12,10 @@ from claim_verdicts import claims_of, verdicts
 from picture_checks import check_provenance, clipped
 
 import saltus
-from saltus.attractors import lyapunov_many
+from saltus import lyapunov_many, search_orbits
 from saltus.files import write_dataset
 from saltus.flow import Ending, find_recurrence
-from saltus.orbits import find_orbit, follow_stable, search_orbits
+from saltus.orbits import find_orbit, follow_stable
 from saltus.plots import figure_of
 from saltus.plots.chart import draw_stability_chart
 from saltus.theory import high_frequency_onset, is_monostable, quasi_static_border, unloaded_fold

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from saltus import response_spectrum
 from saltus.flow import simulate, simulate_many
-from saltus.studies import response_spectrum
 from saltus_paper.figures import harmonic_loads, knots_and_jumps, response_panels
 from saltus_paper.measures.spectrum_features import detached, main_branch
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from shared_systems import forced
 
-from saltus.attractors import basins_of_attraction
+from saltus import basins_of_attraction
 from saltus.attractors.basins import basin_cells
 from saltus.errors import ParameterError
 from saltus.sweep import status

@@ -10,7 +10,7 @@ import xarray
 from attractor_cases import strobes
 from shared_systems import forced, steady, walled
 
-from saltus.attractors import basins_of_attraction
+from saltus import basins_of_attraction
 from saltus.attractors.attractor_search import Attractors, find_attractors
 from saltus.attractors.basins.basin_cells import Grid, Labelling, cell_arguments, cells
 from saltus.attractors.basins.grid import _relabelled

@@ -5,22 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from saltus.attractors import attractors_along, basins_of_attraction, find_attractors
+from saltus import ImpactPair, NewtonImpact, TwoLayer, TwoStops, attractors_along, basins_of_attraction, find_attractors
 from saltus.errors import ParameterError
-from saltus.systems import (
-    Harmonic,
-    ImpactPair,
-    Load,
-    Metainterface,
-    NewtonImpact,
-    System,
-    TwoLayer,
-    TwoStops,
-    VelocityReduction,
-    WallOscillator,
-    check_window,
-    initial_states,
-)
+from saltus.systems import Harmonic, Load, Metainterface, System, VelocityReduction, WallOscillator, check_window, initial_states
 
 BETA80 = math.radians(80)
 

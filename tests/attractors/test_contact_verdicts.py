@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import saltus
-from saltus.attractors import classify, lyapunov_many, lyapunov_spectrum
+from saltus import FourCells, NewtonImpact, ThreeCells, TwoCells, TwoLayer, TwoStops, classify, lyapunov_many, lyapunov_spectrum
 from saltus.errors import ParameterError
-from saltus.systems import FourCells, Harmonic, Load, NewtonImpact, System, ThreeCells, TwoCells, TwoLayer, TwoStops
+from saltus.systems import Harmonic, Load, System
 
 
 def layers(H, m=0.1, e=(0.0, 0.0), transfer=0.0):

@@ -12,8 +12,7 @@ from shared_systems import forced, paired, walled
 from verdict_cases import spread
 
 import saltus
-from saltus import ParameterError
-from saltus.attractors import lyapunov_many, lyapunov_spectrum
+from saltus import ParameterError, lyapunov_many, lyapunov_spectrum
 from saltus.attractors.lyapunov.growth import LYAPUNOV, span_count
 from saltus.attractors.lyapunov.spectrum import Contraction, impact_factor
 from saltus.flow import Ending

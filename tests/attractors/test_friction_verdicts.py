@@ -7,9 +7,9 @@ import pytest
 from shared_systems import Falling
 
 import saltus
-from saltus.attractors import classify, lyapunov_many, lyapunov_spectrum
+from saltus import BeltOscillator, classify, lyapunov_many, lyapunov_spectrum
 from saltus.flow import Ending
-from saltus.systems import BeltOscillator, Harmonic, Load, System
+from saltus.systems import Harmonic, Load, System
 
 
 def forced(amplitude, frequency, model=BeltOscillator, **numbers):

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import saltus
+from saltus import NewtonImpact, TwoLayer
 from saltus.attractors.lyapunov.growth import LYAPUNOV, LargestExponents, Neighbours, stretched
 from saltus.flow import find_recurrence
-from saltus.systems import Harmonic, Load, NewtonImpact, System, TwoLayer
+from saltus.systems import Harmonic, Load, System
 
 
 def layers(amplitude, frequency=1.0, damping=0.1, **law):

@@ -11,8 +11,7 @@ from soft_stops import soft_stop
 from verdict_cases import spread
 
 import saltus
-from saltus import MotionError, ParameterError
-from saltus.attractors import excludes_tori
+from saltus import MotionError, ParameterError, excludes_tori
 
 BETA0 = math.radians(80)
 

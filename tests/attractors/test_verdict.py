@@ -7,8 +7,7 @@ import pytest
 from shared_systems import forced, walled
 
 import saltus
-from saltus import ParameterError
-from saltus.attractors import classify, excludes_tori, zero_one_test
+from saltus import ParameterError, classify, excludes_tori, zero_one_test
 from saltus.attractors.judgement import Reason
 from saltus.attractors.stroboscopic_section import certify
 from saltus.flow import Ending, EventKind, find_recurrence

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from saltus import ParameterError
-from saltus.attractors import zero_one_test
+from saltus import ParameterError, zero_one_test
 from saltus.attractors.nonperiodic import _displacement, zero_one_of_bands
 
 

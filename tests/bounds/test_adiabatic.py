@@ -6,10 +6,11 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
+from saltus import OneContactModel
 from saltus.bounds.adiabatic_invariant import budget, normal_form
 from saltus.bounds.gap_equation import Leaves, Opening
 from saltus.bounds.intervals import Interval
-from saltus.systems import Harmonic, Load, OneContactModel, System
+from saltus.systems import Harmonic, Load, System
 from saltus.taylor.tracing import trace
 
 

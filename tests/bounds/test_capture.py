@@ -8,6 +8,7 @@ import pytest
 from shared_systems import BETA80, forced
 from xarray import DataArray
 
+from saltus import InelasticImpact, TwoLayer
 from saltus.bounds import capture as module
 from saltus.bounds.capture import capture_speed
 from saltus.errors import ParameterError
@@ -16,13 +17,11 @@ from saltus.systems import (
     EnergyRestitution,
     Harmonic,
     ImpactLaw,
-    InelasticImpact,
     Load,
     Metainterface,
     Record,
     RockingBlock,
     System,
-    TwoLayer,
     VelocityReduction,
     WallOscillator,
 )

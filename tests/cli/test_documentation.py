@@ -126,7 +126,7 @@ def test_the_kinds_of_special_points_are_all_there():
 
 
 def test_the_options_of_a_diagram_are_all_there():
-    from saltus.studies import bifurcation_diagram, response_spectrum
+    from saltus import bifurcation_diagram, response_spectrum
 
     options = set(inspect.signature(bifurcation_diagram).parameters) - {"system", "path"}
     rows = dict(re.findall(r"^\| (`[^|]*)\|([^|]*)\|[^|]*\|$", orbits_section("Spectra and diagrams"), re.MULTILINE))
@@ -139,7 +139,7 @@ def test_the_options_of_a_diagram_are_all_there():
 
 
 def test_the_nodes_and_variables_of_a_diagram_are_all_there():
-    from saltus.studies import response_spectrum
+    from saltus import response_spectrum
 
     tree = response_spectrum(forced(), bounds=(0.8, 1.0), max_period=1, values=[0.9], starts=8)
     _, rest = orbits_section("Spectra and diagrams").split("| node | |")

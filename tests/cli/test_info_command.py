@@ -109,7 +109,7 @@ def test_the_wall_oscillator(info):
 
 OWN = """
 from dataclasses import dataclass
-from saltus.systems import OneContactModel
+from saltus import OneContactModel
 
 @dataclass(frozen=True, kw_only=True)
 class Own(OneContactModel):

@@ -33,7 +33,7 @@ FILES = {
     "shaking.csv": "time,force\n" + "\n".join(f"{0.1 * i},{math.sin(0.13 * i * i):.6f}" for i in range(200)) + "\n",
     "hinged.py": """
 from dataclasses import dataclass
-from saltus.systems import OneContactModel
+from saltus import OneContactModel
 
 @dataclass(frozen=True, kw_only=True)
 class Hinged(OneContactModel):

@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 import xarray
 
-from saltus.attractors import basins_of_attraction
+from saltus import basins_of_attraction, stability_chart
 from saltus.config import load_study
 from saltus.plots import figure_of
 from saltus.plots.chart import draw_stability_chart
-from saltus.studies import stability_chart
 from saltus.sweep import open_store, status
 from saltus.sweep.workers import ClusterSettings
 from saltus.systems import System

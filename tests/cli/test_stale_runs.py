@@ -7,7 +7,7 @@ from saltus.sweep import open_store
 
 MODEL = """
 from dataclasses import dataclass
-from saltus.systems import OneContactModel
+from saltus import OneContactModel
 STIFFNESS = 1.0
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,10 +4,10 @@ import math
 
 import pytest
 
+from saltus import phase_portrait, response_spectrum, stability_chart
 from saltus.checks import check_bounds, check_count, check_number, checked_by
 from saltus.errors import ParameterError
 from saltus.flow import simulate
-from saltus.studies import phase_portrait, response_spectrum, stability_chart
 from saltus.systems import Harmonic, Load, Metainterface, RockingBlock, System, VelocityReduction, check_along, check_path
 
 SYSTEM = System(

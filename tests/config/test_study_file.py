@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from saltus import InelasticImpact
 from saltus.config import load_study
 from saltus.systems import (
     EnergyRestitution,
     Harmonic,
-    InelasticImpact,
     Load,
     Metainterface,
     Record,

@@ -9,15 +9,14 @@ import numpy as np
 from shared_systems import paired
 
 import saltus
+from saltus import InelasticImpact, OneContactModel
 from saltus.errors import MotionError, ParameterError
 from saltus.systems import (
     EnergyRestitution,
     Harmonic,
-    InelasticImpact,
     Load,
     Metainterface,
     Model,
-    OneContactModel,
     Record,
     RockingBlock,
     System,

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 import saltus
+from saltus import Contact, Friction, ImpactPair, NewtonImpact
 from saltus.flow import sensitivities, simulate, simulate_many
-from saltus.systems import Contact, ContactModel, Friction, Harmonic, ImpactPair, Load, NewtonImpact, System, energy_gain
+from saltus.systems import ContactModel, Harmonic, Load, System, energy_gain
 
 
 @dataclass(frozen=True, kw_only=True)

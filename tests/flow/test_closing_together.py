@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import saltus
+from saltus import Contact, NewtonImpact
 from saltus.flow import EventKind
-from saltus.systems import Contact, ContactModel, Harmonic, Load, NewtonImpact, System
+from saltus.systems import ContactModel, Harmonic, Load, System
 
 
 @dataclass(frozen=True, kw_only=True)

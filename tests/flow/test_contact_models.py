@@ -6,23 +6,10 @@ import numpy as np
 import pytest
 
 import saltus
+from saltus import Contact, FourCells, ImpactPair, NewtonImpact, ThreeCells, TwoCells, TwoLayer, TwoStops
 from saltus.errors import ParameterError
 from saltus.flow import EventKind
-from saltus.systems import (
-    Contact,
-    FourCells,
-    Harmonic,
-    ImpactPair,
-    Load,
-    NewtonImpact,
-    System,
-    ThreeCells,
-    TwoCells,
-    TwoLayer,
-    TwoStops,
-    VelocityReduction,
-    energy_gain,
-)
+from saltus.systems import Harmonic, Load, System, VelocityReduction, energy_gain
 
 COSINE = math.pi / 2  # the phase of a harmonic that makes it one
 BETA80 = math.radians(80)

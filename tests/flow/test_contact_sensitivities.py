@@ -7,8 +7,9 @@ import pytest
 from test_contacts import BETA80, layers
 
 import saltus
+from saltus import NewtonImpact, TwoStops
 from saltus.flow import EventKind
-from saltus.systems import Harmonic, Load, Metainterface, NewtonImpact, System, TwoStops, VelocityReduction
+from saltus.systems import Harmonic, Load, Metainterface, System, VelocityReduction
 
 PATHS = ("model.beta0", "load.frequency", "load.vertical", "impact.e.0", "impact.e.1", "impact.transfer", "model.damping")
 

@@ -7,19 +7,10 @@ import pytest
 from contact_reference import follow
 
 import saltus
+from saltus import NewtonImpact, TwoLayer, TwoStops
 from saltus.errors import MotionError, ParameterError
 from saltus.flow import EventKind
-from saltus.systems import (
-    Harmonic,
-    Load,
-    Metainterface,
-    NewtonImpact,
-    System,
-    TwoLayer,
-    TwoStops,
-    VelocityReduction,
-    energy_gain,
-)
+from saltus.systems import Harmonic, Load, Metainterface, System, VelocityReduction, energy_gain
 
 BETA80 = math.radians(80)
 

@@ -7,9 +7,10 @@ import pytest
 from test_contacts import BETA80, layers
 
 import saltus
+from saltus import InelasticImpact, NewtonImpact, TwoStops
 from saltus.errors import MotionError
 from saltus.flow import Ending, find_recurrence, stop_names
-from saltus.systems import Harmonic, InelasticImpact, Load, Metainterface, NewtonImpact, System, TwoStops, VelocityReduction
+from saltus.systems import Harmonic, Load, Metainterface, System, VelocityReduction
 
 CASES = 150
 

@@ -7,8 +7,9 @@ import pytest
 from scipy.linalg import expm
 
 import saltus
+from saltus import ImpactPair, NewtonImpact, TwoStops
 from saltus.flow import stop_names
-from saltus.systems import Harmonic, ImpactPair, Load, NewtonImpact, System, TwoStops, VelocityReduction, WallOscillator
+from saltus.systems import Harmonic, Load, System, VelocityReduction, WallOscillator
 
 DISTANCES = [1e3, 1e6, 1e9, 1e12, 1e15]
 DAMPING, AMPLITUDE, FREQUENCY = 0.1, 2.0, 1.3

@@ -5,8 +5,9 @@ import pytest
 from test_contact_models import chain
 from test_contacts import layers
 
+from saltus import TwoCells, TwoStops
 from saltus.flow.kernel.compiled import one_free
-from saltus.systems import Load, System, TwoCells, TwoStops, constrained_acceleration, reactions
+from saltus.systems import Load, System, constrained_acceleration, reactions
 from saltus.taylor import Expr, differentiate, substitute, trace
 
 SYSTEMS = {

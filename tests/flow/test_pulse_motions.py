@@ -10,26 +10,22 @@ import xarray
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from saltus import simulate, simulate_many
-from saltus.errors import ParameterError
-from saltus.flow import sensitivities
-from saltus.orbits import find_orbit
-from saltus.systems import (
+from saltus import (
     Chirp,
     HalfSine,
-    Harmonic,
-    Load,
     MavroeidisPapageorgiou,
     OneContactModel,
     OneCosine,
     OneSine,
     Ramp,
     Ricker,
-    RockingBlock,
-    System,
-    VelocityReduction,
-    WallOscillator,
+    simulate,
+    simulate_many,
 )
+from saltus.errors import ParameterError
+from saltus.flow import sensitivities
+from saltus.orbits import find_orbit
+from saltus.systems import Harmonic, Load, RockingBlock, System, VelocityReduction, WallOscillator
 
 W = 2.3
 PULSES = {

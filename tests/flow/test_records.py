@@ -12,11 +12,11 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 from scipy_motion import by_scipy
 
+from saltus import InelasticImpact
 from saltus.flow import EventKind, simulate
 from saltus.systems import (
     EnergyRestitution,
     Harmonic,
-    InelasticImpact,
     Load,
     Metainterface,
     Record,

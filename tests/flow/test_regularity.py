@@ -9,18 +9,9 @@ import pytest
 from shared_systems import rocking, walled
 from soft_stops import SoftStop, soft_stop
 
+from saltus import OneContactModel
 from saltus.flow import ContactRegularity, contact_regularity, program, simulate
-from saltus.systems import (
-    EnergyRestitution,
-    Harmonic,
-    Load,
-    Metainterface,
-    OneContactModel,
-    RockingBlock,
-    System,
-    VelocityReduction,
-    numbers,
-)
+from saltus.systems import EnergyRestitution, Harmonic, Load, Metainterface, RockingBlock, System, VelocityReduction, numbers
 
 IMPACT, JUMP, CONTINUOUS = ContactRegularity
 

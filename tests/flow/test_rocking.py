@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from saltus import InelasticImpact
 from saltus.flow import EventKind, Stop, simulate
-from saltus.systems import Harmonic, InelasticImpact, Load, RockingBlock, System, VelocityReduction
+from saltus.systems import Harmonic, Load, RockingBlock, System, VelocityReduction
 from saltus.theory import rocking_period, short_rocking_period
 
 

@@ -10,11 +10,11 @@ import pytest
 from shared_systems import paired
 
 import saltus
+from saltus import InelasticImpact
 from saltus.errors import MotionError
 from saltus.systems import (
     EnergyRestitution,
     Harmonic,
-    InelasticImpact,
     Load,
     Metainterface,
     RockingBlock,

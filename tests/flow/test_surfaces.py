@@ -11,8 +11,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import saltus
+from saltus import Contact, NewtonImpact, Surface
 from saltus.flow import sensitivities, simulate, simulate_many
-from saltus.systems import Contact, ContactModel, Harmonic, Load, NewtonImpact, Surface, System
+from saltus.systems import ContactModel, Harmonic, Load, System
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,9 +11,9 @@ import bad_inputs
 import pytest
 import tomli_w
 
+from saltus import response_spectrum
 from saltus.errors import SaltusError
 from saltus.files import read_dataset, write_dataset
-from saltus.studies import response_spectrum
 from saltus.sweep import open_store, status
 from saltus.systems import System
 

@@ -8,18 +8,10 @@ import numpy as np
 import pytest
 
 import saltus
+from saltus import NewtonImpact, TwoLayer, TwoStops
 from saltus.errors import MotionError, ParameterError
 from saltus.orbits import OrbitEnd, SpecialKind, as_json, defects, from_json, orbits_of
-from saltus.systems import (
-    Harmonic,
-    Load,
-    Metainterface,
-    NewtonImpact,
-    System,
-    TwoLayer,
-    TwoStops,
-    VelocityReduction,
-)
+from saltus.systems import Harmonic, Load, Metainterface, System, VelocityReduction
 
 BETA80 = math.radians(80)
 H = "load.horizontal.amplitude"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import saltus
-from saltus.orbits import energies
+from saltus import energies
 
 CASES = int(os.environ.get("SALTUS_CASES", "10000"))
 

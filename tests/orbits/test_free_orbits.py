@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 import saltus
-from saltus import theory
+from saltus import OneContactModel, backbone, free_orbit, theory
 from saltus.errors import MotionError, ParameterError
-from saltus.orbits import backbone, free_orbit
 from saltus.plots import figure_of
 from saltus.plots.curves import draw_backbone
-from saltus.systems import OneContactModel, System
+from saltus.systems import System
 
 
 @dataclass(frozen=True, kw_only=True)

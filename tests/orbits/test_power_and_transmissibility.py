@@ -7,8 +7,8 @@ import pytest
 from scipy.integrate import quad
 
 import saltus
+from saltus import free_orbit, mean_dissipated_power, transmissibility
 from saltus.errors import ParameterError
-from saltus.orbits import free_orbit, mean_dissipated_power, transmissibility
 
 K, C, F, W = 1.7, 0.3, 0.4, 0.9
 

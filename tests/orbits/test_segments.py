@@ -8,12 +8,12 @@ from orbit_cases import CASES, random_guess, slope
 from scipy.integrate import solve_ivp
 from shared_systems import hinged, paired, walled
 
-from saltus import simulate
+from saltus import OneContactModel, simulate
 from saltus.flow import SegmentColumn, SegmentValue
 from saltus.flow.one_contact.segments import SHORT
 from saltus.orbits.equations.one_contact import OneContactEquations, Segments
 from saltus.orbits.signature import Signature
-from saltus.systems import Harmonic, Load, OneContactModel, System, VelocityReduction
+from saltus.systems import Harmonic, Load, System, VelocityReduction
 
 STARTS = {"forced": (0.6, 0.1), "shaken": (0.5, 0.2), "walled": (0.2, 0.9), "rocking": (0.01, 0.02), "hinged": (1.2, 0.3)}
 

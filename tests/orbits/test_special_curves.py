@@ -9,7 +9,8 @@ import pytest
 from shared_systems import walled
 
 import saltus
-from saltus.orbits import SpecialCurve, SpecialPoint
+from saltus import SpecialCurve
+from saltus.orbits import SpecialPoint
 from saltus.orbits.branches import conditions
 from saltus.orbits.branches.conditions import normal_form
 from saltus.orbits.branches.orbit_curve import OrbitCurve

@@ -6,10 +6,11 @@ from typing import ClassVar
 import pytest
 
 import saltus
+from saltus import OneContactModel
 from saltus import result as results
 from saltus.errors import ParameterError
 from saltus.orbits import orbits_of
-from saltus.systems import Harmonic, Load, OneContactModel, System, VelocityReduction, WallOscillator, register
+from saltus.systems import Harmonic, Load, System, VelocityReduction, WallOscillator, register
 from saltus.taylor import equations_of
 
 STIFFNESS = 1.0

@@ -7,14 +7,13 @@ import pytest
 import xarray
 from matplotlib.colors import same_color
 
-from saltus import ParameterError
+from saltus import ParameterError, phase_portrait
 from saltus.branch_tables import branch_tables
 from saltus.plots import figure_of
 from saltus.plots.basins import draw_attractors
 from saltus.plots.conventions import LOOK
 from saltus.plots.plane import draw_plane
 from saltus.plots.response import draw_diagram
-from saltus.studies import phase_portrait
 from saltus.systems import Load, Metainterface, System
 
 

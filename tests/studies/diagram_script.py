@@ -8,9 +8,9 @@ import sys
 import numpy as np
 from shared_systems import forced
 
-from saltus.studies import bifurcation_diagram, response_spectrum
+from saltus import NewtonImpact, TwoStops, bifurcation_diagram, response_spectrum
 from saltus.sweep.memo import Memo
-from saltus.systems import Harmonic, Load, NewtonImpact, System, TwoStops
+from saltus.systems import Harmonic, Load, System
 
 FREQUENCY, BOUNDS = "load.frequency", (1.3, 1.6)  # two motions, their cascades and chaos
 

@@ -4,7 +4,7 @@ import functools
 
 from shared_systems import forced
 
-from saltus.studies import response_spectrum
+from saltus import response_spectrum
 
 FREQUENCY, AMPLITUDE = "load.frequency", "load.horizontal.amplitude"
 

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from shared_systems import forced, under
 
-from saltus import ParameterError, WallOscillator, continue_orbit, find_orbit
+from saltus import ParameterError, WallOscillator, chaotic_bands, continue_orbit, find_orbit
 from saltus.flow import Ending, find_recurrence
 from saltus.orbits import SpecialKind
-from saltus.studies import chaotic_bands
 from saltus.studies.diagram.bands import Band, Edge, EdgeKind, band_dataset, band_origins
 from saltus.studies.diagram.chaos_search import BandSearch
 from saltus.studies.diagram.diagram_work import DiagramWork

@@ -9,9 +9,10 @@ import xarray as xr
 from shared_systems import forced
 
 import saltus
+from saltus import stability_chart
 from saltus.errors import ParameterError
 from saltus.orbits import continue_orbit, continue_special, find_orbit, follow_stable
-from saltus.studies import Borders, bordered_chart, disagreements, stability_chart, with_borders, wrong_cells
+from saltus.studies import Borders, bordered_chart, disagreements, with_borders, wrong_cells
 from saltus.studies.chart.border_work import curve_dataset, explained, stability_loss
 from saltus.studies.chart.changes import ChangeOutcome, Ways, changes_of, keys_of, read_chart, trace
 from saltus.studies.chart.chart_study import sampled_ends

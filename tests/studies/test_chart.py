@@ -7,13 +7,13 @@ import pytest
 import xarray as xr
 from shared_systems import forced
 
+from saltus import TwoStops, search_orbits, stability_chart
 from saltus.errors import ParameterError
-from saltus.orbits import find_orbit, search_orbits
-from saltus.studies import stability_chart
+from saltus.orbits import find_orbit
 from saltus.studies.chart.cells import beyond_limits, joined, seeds, starts
 from saltus.studies.chart.changes import monostable
 from saltus.studies.chart.motions import distinct, has_alike, motion_type
-from saltus.systems import Harmonic, Load, Metainterface, System, TwoStops, VelocityReduction, check_window
+from saltus.systems import Harmonic, Load, Metainterface, System, VelocityReduction, check_window
 from saltus.theory import equilibria, unloaded_fold
 
 H, V = "load.horizontal.amplitude", "load.vertical"

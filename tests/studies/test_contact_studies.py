@@ -8,33 +8,31 @@ import numpy as np
 import pytest
 
 import saltus
-from saltus import branch_of
+from saltus import (
+    BeltOscillator,
+    ImpactPair,
+    NewtonImpact,
+    TwoLayer,
+    TwoStops,
+    bifurcation_diagram,
+    branch_of,
+    response_spectrum,
+    search_orbits,
+    stability_chart,
+)
 from saltus.attractors import judge
 from saltus.attractors.judgement import Reason
 from saltus.flow import Ending, Stop
-from saltus.orbits import orbits_near_returns, search_orbits, solved_near
+from saltus.orbits import orbits_near_returns, solved_near
 from saltus.plots.chart import draw_stability_chart
 from saltus.plots.response import draw_diagram
-from saltus.studies import bifurcation_diagram, bordered_chart, response_spectrum, stability_chart
+from saltus.studies import bordered_chart
 from saltus.studies.chart.motions import CellOutcome
 from saltus.studies.diagram.chaos_search import BandOrigin, BandSearch
 from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.effort import EFFORTS, Effort
 from saltus.studies.diagram.simulated import SimulatedMotions, followed
-from saltus.systems import (
-    BeltOscillator,
-    Harmonic,
-    ImpactPair,
-    Load,
-    Metainterface,
-    NewtonImpact,
-    System,
-    TwoLayer,
-    TwoStops,
-    VelocityReduction,
-    check_window,
-    initial_states,
-)
+from saltus.systems import Harmonic, Load, Metainterface, System, VelocityReduction, check_window, initial_states
 
 BETA80 = math.radians(80)
 FORCE, H = "load.force.amplitude", "load.horizontal.amplitude"

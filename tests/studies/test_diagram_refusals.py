@@ -13,8 +13,8 @@ import pytest
 from shared_systems import forced
 from study_cases import AMPLITUDE, FREQUENCY
 
+from saltus import bifurcation_diagram, response_spectrum
 from saltus.errors import ParameterError
-from saltus.studies import bifurcation_diagram, response_spectrum
 from saltus.studies.diagram.diagram_search import DiagramSearch
 from saltus.systems import Load, Metainterface, System
 
@@ -97,7 +97,7 @@ sys.path[:0] = {tests!r}
 from shared_systems import forced
 from study_cases import FREQUENCY
 from saltus.files import write_dataset
-from saltus.studies import response_spectrum
+from saltus import response_spectrum
 
 def heard(share, what, times=[]):
     times += [what] * what.startswith({when!r})

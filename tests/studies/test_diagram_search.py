@@ -7,11 +7,11 @@ import pytest
 from shared_systems import forced, under
 from study_cases import FREQUENCY
 
+from saltus import response_spectrum, search_orbits
 from saltus.branch_tables import branches_of
 from saltus.flow import find_recurrence
-from saltus.orbits import continue_orbit, orbits_of, search_orbits
+from saltus.orbits import continue_orbit, orbits_of
 from saltus.orbits.orbit import solve
-from saltus.studies import response_spectrum
 from saltus.studies.diagram.diagram_search import MissedShare
 from saltus.studies.diagram.simulated import starts_at
 from saltus.systems import Harmonic, check_window

@@ -16,13 +16,13 @@ from diagram_script import BOUNDS, FREQUENCY, contact_diagram, diagram
 from shared_systems import forced
 from typer.testing import CliRunner
 
+from saltus import response_spectrum
 from saltus import result as results
 from saltus.cli.app import app
 from saltus.errors import ParameterError, SweepError
 from saltus.files import checked_content, write_dataset
 from saltus.flow import Ending
 from saltus.result import identity
-from saltus.studies import response_spectrum
 from saltus.studies.diagram import diagram_work
 from saltus.studies.diagram.effort import EFFORTS, Effort
 from saltus.sweep import Memo, SweepInterrupted, memo, status

@@ -7,9 +7,10 @@ from shared_systems import forced, walled
 from study_cases import FREQUENCY
 
 import saltus
+from saltus import search_orbits
 from saltus.errors import ParameterError
 from saltus.files import write_dataset
-from saltus.orbits import orbits_of, search_orbits
+from saltus.orbits import orbits_of
 
 FACTS = (
     "amplitude",

@@ -8,9 +8,8 @@ from shared_systems import forced, under
 from study_cases import AMPLITUDE, FREQUENCY
 
 import saltus
-from saltus import branch_tables
+from saltus import bifurcation_diagram, branch_tables, response_spectrum
 from saltus.orbits import orbits_of
-from saltus.studies import bifurcation_diagram, response_spectrum
 from saltus.systems import Harmonic
 
 pytestmark = pytest.mark.thorough  # structures of their own for each load

@@ -11,8 +11,9 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import saltus
+from saltus import HalfSine, OneContactModel, OneSine, Ramp
 from saltus.errors import ParameterError
-from saltus.systems import HalfSine, Load, OneContactModel, OneSine, Ramp, Record, RockingBlock, System, VelocityReduction
+from saltus.systems import Load, Record, RockingBlock, System, VelocityReduction
 
 E = 0.9
 

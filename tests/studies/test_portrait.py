@@ -8,9 +8,9 @@ import pytest
 from reference_manifolds import manifold
 from shared_systems import steady
 
+from saltus import TwoLayer, phase_portrait
 from saltus.attractors.phase_plane import equilibria
 from saltus.errors import ParameterError
-from saltus.studies import phase_portrait
 from saltus.systems import (
     EnergyRestitution,
     Harmonic,
@@ -19,7 +19,6 @@ from saltus.systems import (
     Model,
     RockingBlock,
     System,
-    TwoLayer,
     VelocityReduction,
     WallOscillator,
 )

@@ -8,9 +8,9 @@ from shared_systems import forced
 from study_cases import AMPLITUDE
 
 import saltus
+from saltus import bifurcation_diagram
 from saltus.branch_tables import branches_of
 from saltus.orbits import orbits_of
-from saltus.studies import bifurcation_diagram
 from saltus.studies.diagram.diagram_study import confirmed
 from saltus.studies.diagram.diagram_work import DiagramWork
 

@@ -9,9 +9,9 @@ from shared_systems import forced
 from study_cases import AMPLITUDE, FREQUENCY
 
 import saltus
+from saltus import bifurcation_diagram, response_spectrum
 from saltus.orbits import orbits_of
 from saltus.orbits.orbit import solve
-from saltus.studies import bifurcation_diagram, response_spectrum
 
 TOUCHING = 1e-9  # speed or gap below which an orbit grazes: rounding then decides whether there is an impact
 

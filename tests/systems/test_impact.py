@@ -8,18 +8,9 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
+from saltus import InelasticImpact, TwoLayer
 from saltus.errors import ParameterError
-from saltus.systems import (
-    EnergyRestitution,
-    Harmonic,
-    InelasticImpact,
-    Load,
-    Metainterface,
-    RockingBlock,
-    TwoLayer,
-    VelocityReduction,
-    WallOscillator,
-)
+from saltus.systems import EnergyRestitution, Harmonic, Load, Metainterface, RockingBlock, VelocityReduction, WallOscillator
 
 angle = st.floats(0.1, 3.0)
 mass = st.floats(0, 3)

@@ -6,23 +6,10 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from saltus import Chirp, HalfSine, MavroeidisPapageorgiou, OneCosine, OneSine, PhysicalCell, Ramp, Ricker
 from saltus.config import load_study
 from saltus.errors import ParameterError
-from saltus.systems import (
-    Chirp,
-    HalfSine,
-    Harmonic,
-    Load,
-    MavroeidisPapageorgiou,
-    OneCosine,
-    OneSine,
-    PhysicalCell,
-    Ramp,
-    Ricker,
-    RockingBlock,
-    System,
-    WallOscillator,
-)
+from saltus.systems import Harmonic, Load, RockingBlock, System, WallOscillator
 
 A, W, START = 0.7, 2.3, 0.4
 

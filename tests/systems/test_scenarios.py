@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from saltus import TwoLayer
 from saltus.errors import ParameterError
-from saltus.systems import LayerState, Scenario, TwoLayer, name_impact, other_impulse, table_1
+from saltus.systems import LayerState, Scenario, name_impact, other_impulse, table_1
 
 MODEL = TwoLayer(beta0=math.radians(80), mass_ratio=0.3)
 speeds = st.floats(0.01, 10)

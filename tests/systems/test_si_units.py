@@ -10,22 +10,9 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import saltus
+from saltus import HalfSine, InelasticImpact, PhysicalBlock, PhysicalCell, TwoLayer, UnitCell
 from saltus.errors import ParameterError
-from saltus.systems import (
-    HalfSine,
-    Harmonic,
-    InelasticImpact,
-    Load,
-    Metainterface,
-    PhysicalBlock,
-    PhysicalCell,
-    Record,
-    RockingBlock,
-    System,
-    TwoLayer,
-    UnitCell,
-    VelocityReduction,
-)
+from saltus.systems import Harmonic, Load, Metainterface, Record, RockingBlock, System, VelocityReduction
 
 positive = st.floats(1e-3, 1e3)
 physical_cells = st.builds(

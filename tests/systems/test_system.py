@@ -9,21 +9,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from saltus import InelasticImpact, OneContactModel, TwoLayer
 from saltus.errors import ParameterError
 from saltus.systems import (
     IMPACTS,
     MODELS,
     EnergyRestitution,
     Harmonic,
-    InelasticImpact,
     Load,
     MarginKind,
     Metainterface,
-    OneContactModel,
     Record,
     RockingBlock,
     System,
-    TwoLayer,
     VelocityReduction,
     WallOscillator,
     distinct_rows,

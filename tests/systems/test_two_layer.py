@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from saltus.systems import Harmonic, Load, Metainterface, TwoLayer
+from saltus import TwoLayer
+from saltus.systems import Harmonic, Load, Metainterface
 
 EXAMPLE = TwoLayer(beta0=1.3, damping=0.2, stiffness_ratio=0.7, mass_ratio=0.4, dissipation_ratio=1.6)
 LOAD = Load(

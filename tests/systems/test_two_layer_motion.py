@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from saltus import TwoLayer
 from saltus.flow import EventKind, simulate
-from saltus.systems import Harmonic, Load, System, TwoLayer
+from saltus.systems import Harmonic, Load, System
 
 MODEL = TwoLayer(beta0=math.radians(80), mass_ratio=0.4, damping=0.05, stiffness_ratio=0.8, dissipation_ratio=1.2)
 LOAD = Load(frequency=1.2, vertical=-0.5, horizontal=Harmonic(0.2), ground_horizontal=Harmonic(0.1))

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from saltus import UnitCell
 from saltus.errors import ParameterError
-from saltus.systems import UnitCell
 
 CELL = UnitCell(alpha0=math.radians(40), beta0=math.radians(80))
 share = st.floats(0.02, 0.98)

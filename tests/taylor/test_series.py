@@ -13,18 +13,16 @@ import pytest
 from generated_functions import Generated
 from power_series import solution
 
+from saltus import InelasticImpact, OneContactModel, TwoLayer
 from saltus.flow.kernel.compiled import structure_functions
 from saltus.systems import (
     EnergyRestitution,
     Harmonic,
-    InelasticImpact,
     Load,
     Metainterface,
     Model,
-    OneContactModel,
     RockingBlock,
     System,
-    TwoLayer,
     VelocityReduction,
     WallOscillator,
 )

@@ -7,19 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from saltus import OneContactModel
 from saltus.checks import LIMITS
 from saltus.errors import ParameterError, TraceError
-from saltus.systems import (
-    Harmonic,
-    Load,
-    Metainterface,
-    Model,
-    OneContactModel,
-    Record,
-    System,
-    VelocityReduction,
-    WallOscillator,
-)
+from saltus.systems import Harmonic, Load, Metainterface, Model, Record, System, VelocityReduction, WallOscillator
 from saltus.taylor import structure_key
 from saltus.taylor.graph import FRICTION, Expr, combine, differentiate, number, ordered, power, substitute
 from saltus.taylor.tracing import check_size, trace

@@ -8,8 +8,9 @@ import sympy as sp
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from saltus import InelasticImpact
 from saltus.errors import ParameterError
-from saltus.systems import Harmonic, InelasticImpact, Load, Metainterface, System
+from saltus.systems import Harmonic, Load, Metainterface, System
 from saltus.theory import energy_factor, energy_jump, inelastic_contact, velocity_factor
 
 

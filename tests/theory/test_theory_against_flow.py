@@ -8,18 +8,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from saltus import InelasticImpact, OneContactModel
 from saltus.flow import simulate
-from saltus.systems import (
-    EnergyRestitution,
-    Harmonic,
-    InelasticImpact,
-    Load,
-    Metainterface,
-    OneContactModel,
-    RockingBlock,
-    System,
-    VelocityReduction,
-)
+from saltus.systems import EnergyRestitution, Harmonic, Load, Metainterface, RockingBlock, System, VelocityReduction
 from saltus.theory import (
     decayed_period,
     equilibria,

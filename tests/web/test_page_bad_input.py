@@ -34,7 +34,8 @@ def check(found, damaged, extremes):
     assert found["answers"]["refused"] > 0.95 * damaged
     assert found["wrong"] == []
     assert sum(found["kinds"].values()) == extremes
-    assert found["kinds"]["refused"] > 0 and found["kinds"]["whole"] > 0  # whether one ends early depends on the machine's time
+    assert found["kinds"]["refused"] > 0
+    assert found["kinds"]["whole"] > 0  # whether one ends early depends on the machine's time
     assert found["slowest"] < 15_000  # milliseconds; two of them are computed, more where the machine does other things
 
 

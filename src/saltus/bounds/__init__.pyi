@@ -1,4 +1,3 @@
-from .capture import capture_speed as capture_speed
 from .capture import keeps_rest as keeps_rest
 from .capture import proved_speeds as proved_speeds
 from .contraction import area_contraction as area_contraction

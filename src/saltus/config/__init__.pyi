@@ -1,8 +1,5 @@
 from .results import kind_of as kind_of
-from .results import load as load
 from .results import open_result as open_result
-from .results import save as save
-from .results import to_mat as to_mat
 from .study import Ask as Ask
 from .study import Study as Study
 from .study import load_study as load_study

@@ -1,6 +1,4 @@
-from .animation import animate as animate
 from .any_result import DRAWINGS as DRAWINGS
-from .any_result import plot as plot
 from .basins import draw_basins as draw_basins
 from .branch_cuts import ModelValidity as ModelValidity
 from .branch_cuts import border_curves as border_curves

@@ -2,15 +2,4 @@ from .chart.borders import Borders as Borders
 from .chart.borders import with_borders as with_borders
 from .chart.chart_study import bordered_chart as bordered_chart
 from .chart.chart_study import disagreements as disagreements
-from .chart.chart_study import stability_chart as stability_chart
 from .chart.chart_study import wrong_cells as wrong_cells
-from .diagram.chaos_search import chaotic_bands as chaotic_bands
-from .diagram.diagram_study import bifurcation_diagram as bifurcation_diagram
-from .diagram.diagram_study import response_spectrum as response_spectrum
-from .fitting import Fit as Fit
-from .fitting import fit as fit
-from .measured_motions import Measurement as Measurement
-from .overturning import fragility as fragility
-from .overturning import overturning_spectrum as overturning_spectrum
-from .portrait import phase_portrait as phase_portrait
-from .swept_parameter import frequency_sweep as frequency_sweep

@@ -2,7 +2,6 @@ from .chunks import Failure as Failure
 from .execution import SweepInterrupted as SweepInterrupted
 from .execution import check_run as check_run
 from .execution import run as run
-from .mapped import map_over as map_over
 from .memo import Memo as Memo
 from .memo import MemoKind as MemoKind
 from .plan import Plan as Plan

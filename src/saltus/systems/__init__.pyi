@@ -1,10 +1,4 @@
-from .cell_chain import FourCells as FourCells
-from .cell_chain import ThreeCells as ThreeCells
-from .cell_chain import TwoCells as TwoCells
-from .contact_model import Contact as Contact
 from .contact_model import ContactModel as ContactModel
-from .contact_model import Friction as Friction
-from .contact_model import Surface as Surface
 from .contact_model import apart as apart
 from .contact_model import constrained_acceleration as constrained_acceleration
 from .contact_model import mass_and_force as mass_and_force
@@ -15,8 +9,6 @@ from .drawings import Shape as Shape
 from .drawings import drawing_of as drawing_of
 from .impact_laws import EnergyRestitution as EnergyRestitution
 from .impact_laws import ImpactLaw as ImpactLaw
-from .impact_laws import InelasticImpact as InelasticImpact
-from .impact_laws import NewtonImpact as NewtonImpact
 from .impact_laws import VelocityReduction as VelocityReduction
 from .impact_laws import energy_gain as energy_gain
 from .impact_laws import energy_gains as energy_gains
@@ -26,11 +18,7 @@ from .load import Load as Load
 from .metainterface import Metainterface as Metainterface
 from .model import MarginKind as MarginKind
 from .model import Model as Model
-from .model import OneContactModel as OneContactModel
-from .oscillators import BeltOscillator as BeltOscillator
-from .oscillators import ImpactPair as ImpactPair
 from .oscillators import RockingBlock as RockingBlock
-from .oscillators import TwoStops as TwoStops
 from .oscillators import WallOscillator as WallOscillator
 from .parameter_tables import broadcast_arrays as broadcast_arrays
 from .parameter_tables import check_along as check_along
@@ -39,13 +27,6 @@ from .parameter_tables import check_path as check_path
 from .parameter_tables import distinct_rows as distinct_rows
 from .parameter_tables import finite_array as finite_array
 from .parameter_tables import parameter_table as parameter_table
-from .pulses import Chirp as Chirp
-from .pulses import HalfSine as HalfSine
-from .pulses import MavroeidisPapageorgiou as MavroeidisPapageorgiou
-from .pulses import OneCosine as OneCosine
-from .pulses import OneSine as OneSine
-from .pulses import Ramp as Ramp
-from .pulses import Ricker as Ricker
 from .reversed import reversed_system as reversed_system
 from .scenarios import LayerState as LayerState
 from .scenarios import Scenario as Scenario
@@ -60,8 +41,6 @@ from .serial import numbers as numbers
 from .serial import register as register
 from .serial import signal_class as signal_class
 from .serial import substitute as substitute
-from .si_units import PhysicalBlock as PhysicalBlock
-from .si_units import PhysicalCell as PhysicalCell
 from .signals import Constant as Constant
 from .signals import Harmonic as Harmonic
 from .signals import Pulse as Pulse
@@ -89,5 +68,3 @@ from .states import within_window as within_window
 from .system import System as System
 from .system import check_system as check_system
 from .system import image_of as image_of
-from .two_layer import TwoLayer as TwoLayer
-from .unit_cell import UnitCell as UnitCell
