@@ -189,7 +189,7 @@ def page(
     Example: [cyan]saltus page study.toml --with results/study/basins.nc[/]
     """
     with guarded():
-        from saltus.cli.page_command import write_page
+        from saltus.cli.run_command import write_page
 
         write_page(study, results or [], output)
 
@@ -210,7 +210,7 @@ def explore(
     Example: [cyan]saltus explore study.toml --with results/study/basins.nc[/]
     """
     with guarded():
-        from saltus.cli.page_command import write_page
+        from saltus.cli.run_command import write_page
 
         write_page(study, results or [], None, show=True)
 

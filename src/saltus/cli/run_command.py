@@ -1,4 +1,5 @@
-"""`saltus simulate`, `run` and `plot`: a study's motion and the answers to its questions, computed, written and drawn."""
+"""`saltus simulate`, `run`, `plot`, `page` and `explore`: a study's motion and the answers to its questions, computed, written
+and drawn, and its page."""
 
 from __future__ import annotations
 
@@ -12,6 +13,8 @@ from saltus.errors import ParameterError, SaltusError
 from saltus.progress import Progress
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from saltus.config import Ask, Study
     from saltus.flow import Motion
 
@@ -259,3 +262,26 @@ def draw_file(path: Path, stem: Path, data: Any) -> list[Path]:
         said = "" if isinstance(error, SaltusError) else f"{type(error).__name__}: "
         said += " ".join(str(error).split())
         raise ParameterError(f"{path} says that it is of the kind {kind!r}, but it cannot be drawn ({said:.150})") from None
+
+
+def write_page(path: Path, results: Iterable[Path], output: Path | None, show: bool = False) -> None:
+    """Write the page of the study at `path`, open it if it is to be shown, and print where it is.
+
+    Raises
+    ------
+    SaltusError
+        A bad study, a file that is no result of it, a page that cannot be made or written.
+    """
+    import webbrowser
+
+    import saltus
+
+    study = saltus.load_study(path)
+    given = dict(study.simulate.arguments) if study.simulate else {}
+    known = (*study.system.model.coordinates, "velocity", "periods", "duration", "tol", "time")
+    settings = {name: value for name, value in given.items() if name in known}
+    file = (Path("results") / study.name if show else Path()) / f"{study.name}.html" if output is None else output
+    made = saltus.page(study.system, *map(saltus.load, results), path=file, title=study.name, **settings)
+    opened = show and webbrowser.open(made.absolute().as_uri())
+    said = "your browser opens it" if opened else "open it in a browser"
+    Console(highlight=False).print(f"The page is {made}; {said}.", markup=False, soft_wrap=True)

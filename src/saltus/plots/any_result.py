@@ -12,9 +12,8 @@ from saltus.plots.chaos import draw_chaotic_bands, draw_exponents, draw_exponent
 from saltus.plots.chart import draw_stability_chart
 from saltus.plots.conventions import LOOK, axes_or_new, figure_of, style
 from saltus.plots.curves import draw_attractors_along, draw_backbone, draw_branch, draw_cascade, draw_search, draw_special_curve
-from saltus.plots.measured import draw_energies, draw_fit
+from saltus.plots.experiments import draw_energies, draw_fit, draw_fragility, draw_overturning
 from saltus.plots.motion import draw_ensemble, draw_motion, draw_sensitivities, draw_sweep
-from saltus.plots.overturning import draw_fragility, draw_overturning
 from saltus.plots.plane import draw_manifold, draw_plane, draw_separatrix
 from saltus.plots.response import draw_diagram
 from saltus.plots.unit_cell import draw_unit_cell
