@@ -44,7 +44,7 @@ exact = 2 * np.pi / np.sqrt(2 * 8.0) + 4 * 0.25  # a swing of the frequency sqrt
 print(f"period {period:.13f}, closed form {exact:.13f}")
 
 load = saltus.Load(frequency=1.2, force=saltus.Harmonic(0.4))
-driven = saltus.System(model=Backlash(stiffness=1.0, damping=0.1), load=load).in_gap_coordinates
+driven = saltus.System(model=Backlash(stiffness=1.0, damping=0.1), load=load)
 branch = saltus.continue_orbit(saltus.find_orbit(driven, x=0.0, y=0.0), "load.frequency", (0.8, 1.6))
 figure, (ax, response) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
 times = np.linspace(0.0, free.time, 500)

@@ -36,7 +36,7 @@ system = saltus.System(model=Ball(), load=load, impact=saltus.NewtonImpact(e=E))
 phase = math.acos(born / AMPLITUDE)  # of the impacts, at which the table has the speed `born`
 height = AMPLITUDE * math.sin(phase)
 motion = saltus.simulate(system, x=height, velocity=math.pi, time=phase, duration=6 * math.pi - phase)
-orbit = saltus.find_orbit(system.in_gap_coordinates, x=motion.x, velocity=motion.velocity)
+orbit = saltus.find_orbit(system, x=motion.x, velocity=motion.velocity)
 branch = saltus.continue_orbit(orbit, "load.ground.amplitude", (0.7, 1.6))
 places = {str(point.kind): point.parameter for point in branch.special}
 print(f"born at {places['LP']:.12f}, doubled at {places['PD']:.12f}")

@@ -281,8 +281,9 @@ def test_a_bounce_of_period_one_is_born_and_doubled_where_its_closed_form_says(e
     thrown = math.acos(born / amplitude)  # the phase of the impacts, at which the table has the speed `born`
     system = on_a_table(amplitude, e)
     begin = simulate(system, x=amplitude * math.sin(thrown), velocity=math.pi, time=thrown, duration=2 * math.pi - thrown)
-    orbit = saltus.find_orbit(system.in_gap_coordinates, x=begin.x, velocity=begin.velocity, period=1, settle=0)
+    orbit = saltus.find_orbit(system, x=begin.x, velocity=begin.velocity, period=1, settle=0)
     assert orbit.stable
+    assert orbit.x == pytest.approx(begin.x, abs=1e-12)
     branch = saltus.continue_orbit(orbit, "load.ground.amplitude", (0.9 * born, 1.1 * doubled))
     places = {str(point.kind): point.parameter for point in branch.special if point.kind in ("LP", "PD")}
     assert places == {"LP": pytest.approx(born, abs=1e-10), "PD": pytest.approx(doubled, abs=1e-10)}
@@ -379,6 +380,12 @@ def test_margins_and_energies_are_those_of_the_own_coordinates():
     fast = simulate(LEVER, x=0.5, y=1.9, velocity=(0.2, 1.0), periods=5, stop_at=["low"])
     assert fast.limit == "low"
     assert fast.y == pytest.approx(2.0, abs=1e-12)
+    response = (
+        (simulate(DAMPER, z=0.0, y=0.9, periods=3), lambda t, q, v: q[1]),
+        (simulate(PAIR, z=0.0, x=0.9, periods=3), lambda t, q, v: q[0] + q[1]),
+    )
+    ratios = [saltus.transmissibility(motion, "force", each) for motion, each in response]
+    assert ratios[0] == pytest.approx(ratios[1], rel=1e-10)
     balance = saltus.energies(simulate(DAMPER, z=0.0, y=0.9, velocity=(0.2, 0.4), periods=20), periods=20)
     assert abs(balance.defect) < 1e-12
     assert float(balance.energy.sel(part="impact.left")) > 0.0
@@ -399,6 +406,64 @@ def test_systems_in_gap_coordinates_are_files_and_messages_to_other_processes_li
     assert pickle.loads(pickle.dumps(inner)) == inner
     assert inner.parameters == LEVER.parameters
     assert LEVER.with_({"model.arm": 2.0}).in_gap_coordinates == inner.with_({"model.arm": 2.0})
+
+
+def test_orbits_and_branches_are_those_of_the_own_coordinates():
+    """The impacts of a ball's bounce of period 1 with g = Omega = 1 are at the height a sin(t) with a cos(t) = b = pi (1 - e) /
+    (1 + e); it leaves the table with the speed pi, and rises by pi^2 / 2."""
+    saltus.register(Ball)
+    system, born = on_a_table(1.1, 0.6), math.pi * (1.0 - 0.6) / (1.0 + 0.6)
+    height, thrown = math.sqrt(1.1**2 - born**2), math.acos(born / 1.1)
+    begin = simulate(system, x=height, velocity=math.pi, time=thrown, duration=2 * math.pi - thrown)
+    orbit = saltus.find_orbit(system, x=begin.x, velocity=begin.velocity)
+    assert (orbit.system, orbit.period, orbit.impact_count, orbit.stable) == (system, 1, 1, True)
+    np.testing.assert_allclose(orbit.section_state, begin.final_state, rtol=0, atol=1e-11)
+    assert orbit.highest == pytest.approx(height + math.pi**2 / 2, abs=1e-12)
+    flown = thrown + np.linspace(0.0, 2 * math.pi, 100_001)  # until the next impact
+    assert orbit.lowest == pytest.approx((height + math.pi * (flown - thrown) - (flown - thrown) ** 2 / 2).min(), abs=1e-12)
+    assert orbit.defect < 1e-12
+    branch = saltus.continue_orbit(orbit, "load.ground.amplitude", (1.09, 1.11))
+    data = branch.to_xarray()
+    np.testing.assert_allclose(data.highest, np.sqrt(data.parameter**2 - born**2) + math.pi**2 / 2, rtol=0, atol=1e-12)
+    again = saltus.orbits.orbits_of(data)
+    assert [each.start() for each in again] == [each.start() for each in branch.orbits]
+    sweep = saltus.frequency_sweep(system, [1.1, 1.15], path="load.ground.amplitude", x=begin.x, velocity=begin.velocity)
+    expected = [math.sqrt(a**2 - born**2) + math.pi**2 / 2 for a in (1.1, 1.15)]
+    np.testing.assert_allclose(sweep.largest_x, [expected, expected], rtol=0, atol=1e-8)
+
+
+def test_attractors_verdicts_and_basins_are_those_of_the_coordinate_of_the_distance():
+    changes = {"load.frequency": 0.8, "load.force.amplitude": 0.3, "model.damping": 0.1}  # two attractors, mirror images
+    bodies, pair = DAMPER.with_(changes), PAIR.with_(changes)
+    into = np.kron(np.eye(2), [[1.0, 0.0], [-1.0, 1.0]])  # z and y - z
+    starts = np.random.default_rng(1).uniform(-0.5, 0.5, (6, 4))
+    one = saltus.find_attractors(bodies, starts=4, also=starts)
+    other = saltus.find_attractors(pair, starts=4, also=starts @ into.T)
+    assert len(one) == len(other) == 2
+    same = {}
+    for member in one:
+        known = min(other, key=lambda known: known.target.distance(member.states @ into.T).max())
+        same[member.label] = known.label
+        assert (member.kind, member.period) == (known.kind, known.period) == (saltus.Ending.PERIODIC, 2)
+        assert known.target.distance(member.states @ into.T).max() < 1e-6
+        np.testing.assert_allclose(np.abs(member.orbit.multipliers), np.abs(known.orbit.multipliers), rtol=0, atol=1e-9)
+        z, x, *velocity = known.states[0].tolist()
+        motion = simulate(pair, z=z, x=x, velocity=tuple(velocity), periods=2)
+        times = np.append(np.linspace(0.0, motion.time, 20_001), motion.impacts.time)
+        (z, x), _ = motion.at(times)
+        highest = max(z.max(), (z + x).max())
+        assert member.highest == pytest.approx(highest, abs=1e-6)
+    assert same[1] != same[2]
+    assert [same[int(label)] for label in one.carried] == other.carried.tolist()
+    verdict = saltus.classify(bodies, z=0.0, y=0.3)
+    assert (verdict.kind, verdict.period) == (saltus.Ending.PERIODIC, 2)
+    cells = {"z": [-0.2, 0.3], "y": [-0.4, 0.2, 1.4], "z_velocity": 0.1, "y_velocity": 0.0}
+    label = saltus.basins_of_attraction(bodies, found=one, **cells).label
+    assert (label.sel(y=1.4) == -1).all()  # beyond the wall
+    for z in (-0.2, 0.3):
+        for y in (-0.4, 0.2):
+            end = saltus.classify(pair, z=z, x=y - z, velocity=(0.1, -0.1)).orbit
+            assert same[int(label.sel(z=z, y=y))] == min((1, 2), key=lambda k: other.of(k).target.distance(end.section_state))
 
 
 def model_with(*contacts, names=("x", "y"), frictions=(), body=None):
@@ -442,8 +507,5 @@ def test_what_cannot_be_followed_is_refused_when_the_system_is_made():
     rubbed = (Friction(name="f", coordinate="x", kinetic=0.1), Friction(name="g", coordinate="y", kinetic=0.1))
     with pytest.raises(saltus.ParameterError, match="and from the coordinates of frictions"):
         System(model=model_with(Contact(name="a", coordinate=SUM), frictions=rubbed))
-    made = System(model=model_with(Contact(name="a", coordinate={"y": 1.0, "x": -1.0})), load=Load(frequency=1.0))
-    with pytest.raises(saltus.ParameterError, match=r"find_orbit works in coordinates .* which has x, y_minus_x"):
-        saltus.find_orbit(made, x=0.0, y=0.0)
     with pytest.raises(saltus.ParameterError, match="y_minus_z = -2 lies beyond the contact 'left' at y_minus_z = -1"):
         simulate(DAMPER, z=0.0, y=-2.0, duration=1.0)

@@ -119,13 +119,12 @@ def test_motions_in_lanes_pass_the_same_surfaces():
 
 
 def test_orbits_of_a_soft_stop_are_found_and_followed():
-    inner = SOFT.in_gap_coordinates
-    orbit = saltus.find_orbit(inner, x=0.0, y=0.0)
+    orbit = saltus.find_orbit(SOFT, x=0.0, y=0.0)
     assert orbit.stable
     assert orbit.defect < 1e-12
     motion = orbit.motion()
     assert len(motion.events) == 6
-    tangent = sensitivities(inner, **orbit.start(), periods=1)
+    tangent = sensitivities(SOFT, **orbit.start(), periods=1)
     np.testing.assert_allclose(np.sort_complex(orbit.multipliers), np.sort_complex(np.linalg.eigvals(tangent.state)), atol=1e-9)
     branch = saltus.continue_orbit(orbit, "load.frequency", (0.88, 0.92))
     assert max(point.orbit.residual for point in branch.points) < 1e-11

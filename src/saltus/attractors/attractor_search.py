@@ -14,7 +14,16 @@ from saltus.attractors.classification import classify
 from saltus.attractors.stroboscopic_section import section_states, solved_orbit, stays_at_rest, with_clock
 from saltus.checks import check_count, check_number, check_starts, check_states, checked_by
 from saltus.errors import ParameterError
-from saltus.flow import RECURRENCE, Ending, Recurrence, extrema_names, find_recurrence, motions_from, stroboscopic
+from saltus.flow import (
+    RECURRENCE,
+    Ending,
+    Recurrence,
+    extrema_names,
+    find_recurrence,
+    motions_from,
+    simulate,
+    stroboscopic,
+)
 from saltus.orbits import Branch, PeriodicOrbit, is_symmetric
 from saltus.progress import Progress, part_of, silent
 from saltus.systems import (
@@ -106,6 +115,8 @@ class KnownAttractors:
             if member.kind is Ending.REST and np.abs(member.states[0] - state).max() < _near(state):
                 return member.label
         held = state[: len(self.system.model.coordinates)]
+        if self.system.in_gap_coordinates is not self.system:  # contacts may hold it to a wall that moves
+            held = simulate(self.system, **arguments_of(self.system, state), periods=1).extrema
         evidence = "proved: captured at the contact for all later loads, or at rest where no load ever pulls"
         return self._add(Ending.REST, state[None], (float(held.min()), float(held.max())), evidence)
 
@@ -163,10 +174,14 @@ class KnownAttractors:
             return self._fail(f"{where}: {verdict.reason}")
         if float(verdict.exponents.values.sum()) > -SETTINGS.lossless:
             return self._fail(f"{where}: {verdict.kind}, but areas do not shrink, so nothing attracts")
-        sample = motions_from(
-            self.system, state[None], periods=SETTINGS.sample, sample=("state", "extrema"), last="all", tol=1e-10
-        )
-        high, low = (float(sample[f"overall_{name}"].values[0]) for name in extrema_names(self.system.model.coordinates))
+        sums = self.system.in_gap_coordinates is not self.system  # lanes record the extrema of other coordinates
+        sampled = ("state",) if sums else ("state", "extrema")
+        sample = motions_from(self.system, state[None], periods=SETTINGS.sample, sample=sampled, last="all", tol=1e-10)
+        if sums:
+            extrema = simulate(self.system, **start, periods=SETTINGS.sample, tol=1e-10).extrema
+            low, high = float(extrema.min()), float(extrema.max())
+        else:
+            high, low = (float(sample[f"overall_{name}"].values[0]) for name in extrema_names(self.system.model.coordinates))
         return self._add(verdict.kind, stroboscopic(self.system, sample)[0], (low, high), verdict.reason)
 
     def add_images(self) -> None:

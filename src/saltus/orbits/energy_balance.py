@@ -158,6 +158,7 @@ def course_of(of: Followed, periods: int | None) -> SampledPart:
     middle, half = (first + 0.5 * length_left)[used], 0.5 * length_left[used]
     time = (middle[:, None] + half[:, None] * NODES).reshape(-1)
     position, velocity, side = dense.states(time)
+    position, velocity = (np.array(rows) for rows in motion.system.from_gaps(time, position, velocity))
     return SampledPart(motion, begin, end, time, position, velocity, side, (half[:, None] * WEIGHTS).reshape(-1))
 
 

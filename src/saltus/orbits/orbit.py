@@ -17,7 +17,7 @@ from saltus.notebook import html_table
 from saltus.orbits.equations.contract import OrbitEquations, OrbitEvaluation, Solution
 from saltus.orbits.signature import TOLERANCES, Signature
 from saltus.result import Result
-from saltus.systems import System
+from saltus.systems import System, arguments_of, state_of
 
 if TYPE_CHECKING:
     import xarray
@@ -88,7 +88,7 @@ class PeriodicOrbit(Result):
     @cached_property
     def system(self) -> System:
         """The system, with the orbit's parameters."""
-        return self.equations.system_at(self.solution.values)
+        return self.equations.given_at(self.solution.values)
 
     @property
     def signature(self) -> Signature:
@@ -208,14 +208,22 @@ class PeriodicOrbit(Result):
         return self.solution.evaluation.extremes
 
     @cached_property
+    def _own_extrema(self) -> np.ndarray:
+        return self.motion().extrema
+
+    @cached_property
     def highest(self) -> float:
         """The largest value of the coordinate; with several coordinates, of any of them."""
+        if self._in_others:
+            return float(self._own_extrema[:, 1].max())
         top, bottom = self._extremes[:, SegmentColumn.HIGHEST].max(), self._extremes[:, SegmentColumn.LOWEST].min()
         return float(max(top, -bottom) if self.symmetric else top)
 
     @cached_property
     def lowest(self) -> float:
         """The least value of the coordinate; with several coordinates, of any of them."""
+        if self._in_others:
+            return float(self._own_extrema[:, 0].min())
         return -self.highest if self.symmetric else float(self._extremes[:, SegmentColumn.LOWEST].min())
 
     @property
@@ -290,7 +298,23 @@ class PeriodicOrbit(Result):
     def start(self) -> dict[str, Any]:
         """The arguments of `simulate` that start a motion on the orbit: just after its first impact or, without impacts, at phase
         0; with several contacts or with rests, between two events."""
-        return self.equations.start(self.solution)
+        start = self.equations.start(self.solution)
+        if not self._in_others:
+            return start
+        inner = state_of(self.system.in_gap_coordinates, start)
+        own = np.concatenate(self.system.from_gaps(start.get("time", 0.0), *np.split(inner, 2)))
+        return arguments_of(self.system, own) | {name: value for name, value in start.items() if name == "time"}
+
+    @property
+    def _in_others(self) -> bool:
+        """Whether the contacts of its system keep sums of coordinates, so that the equations are those of other coordinates."""
+        return self.equations.system is not self.equations.given
+
+    @property
+    def followed(self) -> Motion:
+        """One period of its motion in the coordinates of its equations."""
+        start = self.equations.start(self.solution)
+        return simulate(self.system.in_gap_coordinates, **start, periods=self.period, tol=1e-13)
 
     def motion(self, periods: float | None = None, tol: float = 1e-13) -> Motion:
         """The exact motion on the orbit, from `start`.
@@ -357,10 +381,10 @@ class PeriodicOrbit(Result):
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_") or name in ("equations", "solution"):
             raise AttributeError(name)
-        if name == "velocity" or name in self.equations.system.model.coordinates:
+        if name == "velocity" or name in self.system.model.coordinates:
             position, velocity = self.state
             values = np.atleast_1d(position)
-            return velocity if name == "velocity" else float(values[self.equations.system.model.coordinates.index(name)])
+            return velocity if name == "velocity" else float(values[self.system.model.coordinates.index(name)])
         raise AttributeError(f"a PeriodicOrbit has no {name!r}")
 
     @cached_property

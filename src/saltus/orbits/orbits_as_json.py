@@ -105,7 +105,7 @@ def _fields(found: Any) -> tuple[Any, ...]:
 # Each class with the parts of an object, and how it is made of these; properties that were computed and kept are not written.
 CLASSES: dict[str, tuple[type, Callable[[Any], tuple[Any, ...]], Callable[..., Any]]] = {
     "System": (System, lambda system: (system.to_json(),), System.from_json),
-    "Equations": (OrbitEquations, lambda e: (e.system, e.signature, e.paths, e.tol), equations_of),
+    "Equations": (OrbitEquations, lambda e: (e.given, e.signature, e.paths, e.tol), equations_of),
     "OrbitPoint": (OrbitPoint, lambda point: (point.curve, point.place, point.tangent, point.iterations), _point),
     "PeriodicOrbit": (PeriodicOrbit, _orbit_parts, _orbit),
 }

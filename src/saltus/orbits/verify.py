@@ -65,7 +65,7 @@ def defects(orbits: list[PeriodicOrbit], rounds: int = 1, tol: float = 1e-13) ->
     if len(orbits) == 0:
         return np.zeros(0)
     equations = orbits[0].equations
-    return closing_distances(equations.system, next(iter(equations.paths), None), closing_rows(orbits, rounds), tol)
+    return closing_distances(equations.given, next(iter(equations.paths), None), closing_rows(orbits, rounds), tol)
 
 
 def closing_rows(orbits: list[PeriodicOrbit], rounds: int = 1) -> np.ndarray:

@@ -409,8 +409,17 @@ def sides_for(model: Any, t: Any, q: Any, load: Any) -> tuple[Sides, ...]:
         return ()
     if isinstance(load, LoadOnSides):
         return (load.sides,)
-    places, values = model.coordinates, q if len(model.coordinates) > 1 else (q,)
-    return (Sides({each.name: each.side(values[places.index(each.coordinate)]) for each in model.surfaces}),)
+    known = dict(zip(model.coordinates, q if len(model.coordinates) > 1 else (q,), strict=True))
+
+    def at(surface: Surface) -> Any:
+        """The coordinate of a surface, or its sum."""
+        if isinstance(surface.coordinate, str):
+            return known[surface.coordinate]
+        return sum(
+            factor * (known[name] if name in known else getattr(load, name)(t)) for name, factor in surface.coordinate.items()
+        )
+
+    return (Sides({each.name: each.side(at(each)) for each in model.surfaces}),)
 
 
 def _held(entry: Any, i: int, j: int, free: Sequence[Any]) -> Any:

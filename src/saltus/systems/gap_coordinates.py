@@ -118,7 +118,8 @@ class InGapCoordinates(ContactModel):
 
     def gap_states(self, t: Any, position: Any, velocity: Any, load: Any) -> tuple[np.ndarray, np.ndarray]:
         """The inverse of `own_states`, in which what contacts hold up to rounding is held exactly."""
-        q, v = _stacked(self.in_gaps(t, _values(position), load)), _stacked(self.in_gaps(t, _values(velocity), load, 1))
+        places, rates = self.in_gaps(t, _values(position), load), self.in_gaps(t, _values(velocity), load, 1)
+        q, v = np.split(_stacked([*_each_of(places), *_each_of(rates)]), 2)
         for contact in self.contacts:
             place, at = self.coordinates.index(contact.coordinate), np.asarray(contact.position, dtype=float)
             there = np.abs(q[place] - at) <= CLOSED_BELOW * (1.0 + np.abs(q).max(axis=0))

@@ -142,7 +142,7 @@ class NamedTypes(UserDict[str, Any]):
 
     def __getitem__(self, name: str) -> Any:
         if self.data[name] is None:
-            self.data[name] = getattr(import_module("saltus.systems"), name)
+            self.data[name] = getattr(import_module("saltus"), name)
         return self.data[name]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from typing import Any
 
@@ -124,6 +124,22 @@ def state_of(system: System, arguments: Mapping[str, Any]) -> np.ndarray:
     return np.append([arguments[name] for name in system.model.coordinates], arguments["velocity"])
 
 
+def in_gaps(system: System, states: np.ndarray) -> np.ndarray:
+    """States (..., d) at phase 0 as those of `system.in_gap_coordinates`."""
+    return states if system.in_gap_coordinates is system else _led(system.to_gaps, states)
+
+
+def from_gaps(system: System, states: np.ndarray) -> np.ndarray:
+    """The inverse of `in_gaps`."""
+    return states if system.in_gap_coordinates is system else _led(system.from_gaps, states)
+
+
+def _led(leads: Callable[..., Any], states: np.ndarray) -> np.ndarray:
+    """States (..., d) in other coordinates, at time 0."""
+    flat = states.reshape(-1, states.shape[-1]).T
+    return np.asarray(np.concatenate(leads(0.0, *np.split(flat, 2))).T.reshape(states.shape))
+
+
 HALF_WIDTH = 1.5  # the half width of the default window: about the size of the motions in the paper
 
 Box = tuple[tuple[float, float], ...]  # bounds of each coordinate, then of each velocity
@@ -171,7 +187,7 @@ def check_window(window: Any, system: System) -> Window:
         if not single:
             meant = f"{2 * len(names)} pairs (least, largest), of {', '.join(names)}, then of their velocities,"
         raise ParameterError(f"window must be {meant}, got {shown(window)}", "window")
-    for contact in system.model.contacts:
+    for contact in (each for each in system.model.contacts if each.coordinate in names):
         low, high = bounds[names.index(contact.coordinate)]
         if max(contact.gap(low), contact.gap(high)) < 0.0:
             raise ParameterError(
@@ -189,7 +205,7 @@ def _default_window(system: System) -> Window:
         middle = float(model.contact)
         return Window(((middle - HALF_WIDTH, middle + HALF_WIDTH), (-HALF_WIDTH, HALF_WIDTH)))
     bounds = {name: [-HALF_WIDTH, HALF_WIDTH] for name in model.coordinates}
-    for contact in model.contacts:
+    for contact in (each for each in model.contacts if each.coordinate in model.coordinates):
         at, pair = float(contact.position), bounds[contact.coordinate]
         alone = sum(other.coordinate == contact.coordinate for other in model.contacts) == 1
         pair[:] = sorted((at, at + contact.sign * HALF_WIDTH)) if alone else pair
@@ -225,8 +241,16 @@ def within_window(system: System, points: np.ndarray, window: Window, shrunk: An
     """
     rest = rest_state(system)
     states = np.asarray((points * window.half + (window.centre - rest)) * shrunk + rest)
-    states = on_this_side(system, states)
-    return _held(system, states, window) if system.model.contacts else states
+    states, inner = on_this_side(system, states), system.in_gap_coordinates
+    if not system.model.contacts:
+        return states
+    bounds = np.asarray(window)
+    if inner is not system:  # the box around the window
+        rows: Any = inner.model
+        centre = in_gaps(system, window.centre)
+        half = np.abs(np.kron(np.eye(2), np.array(rows.sums()[0], dtype=float))) @ window.half
+        bounds = np.stack([centre - half, centre + half], axis=1)
+    return from_gaps(system, _held(inner, in_gaps(system, states), bounds))
 
 
 def rest_state(system: System, last: np.ndarray | None = None) -> np.ndarray:
@@ -235,6 +259,8 @@ def rest_state(system: System, last: np.ndarray | None = None) -> np.ndarray:
     model, names = system.model, system.model.coordinates
     if last is not None and model.holds_coordinates:
         return last
+    if (inner := system.in_gap_coordinates) is not system:
+        return from_gaps(system, rest_state(inner))
     state = np.zeros(2 * len(names))
     if model.sides:
         state[0] = float(model.contact)
@@ -247,12 +273,16 @@ def rest_state(system: System, last: np.ndarray | None = None) -> np.ndarray:
 def is_still(system: System, highest: np.ndarray, lowest: np.ndarray, within: float) -> np.ndarray:
     """Whether motions with these extrema stay within a distance of the position of one contact, or of 0 without contacts."""
     model = system.model
-    places = [float(contact.position) for contact in model.contacts] or [float(model.contact) if model.sides else 0.0]
+    places = [float(each.position) for each in model.contacts if each.coordinate in model.coordinates]
+    places = places or [float(model.contact) if model.sides else 0.0]
     return np.asarray(np.any([np.maximum(np.abs(highest - place), np.abs(lowest - place)) <= within for place in places], axis=0))
 
 
 def on_this_side(system: System, states: np.ndarray) -> np.ndarray:
     """States (..., d), changed in place: those beyond a wall, or beyond one of several contacts, are reflected at it."""
+    if (inner := system.in_gap_coordinates) is not system:
+        states[...] = from_gaps(system, on_this_side(inner, in_gaps(system, states)))
+        return states
     names = system.model.coordinates
     if len(system.model.sides) == 1:
         wall, inward = float(system.one_contact.contact), system.one_contact.inward(system.model.sides[0])
@@ -271,6 +301,9 @@ def states_beside(system: System, states: np.ndarray, shifts: np.ndarray) -> np.
 
     Contacts that are then open by no more than rounding are closed.
     """
+    if (inner := system.in_gap_coordinates) is not system:
+        begin = in_gaps(system, states)
+        return from_gaps(system, states_beside(inner, begin, in_gaps(system, states + shifts) - begin))
     names, moved = system.model.coordinates, on_this_side(system, states + shifts)
     held = held_by_contacts(system, states)
     for contact in system.model.contacts:
@@ -284,14 +317,18 @@ def states_beside(system: System, states: np.ndarray, shifts: np.ndarray) -> np.
 
 def before_impacts(system: System, states: np.ndarray) -> np.ndarray:
     """States (..., d) in which every coordinate that is at one of several contacts and moves into it is moved back from it by one
-    rounding: the state just before the impact, which then happens at once.
+    rounding: the state just before the impact, which then happens at once. Sums of coordinates are moved back by more than the
+    rounding within which they count as closed.
     """
-    names, moved = system.model.coordinates, states.copy()
-    for contact in system.model.contacts:
+    inner, moved = system.in_gap_coordinates, in_gaps(system, states).copy()
+    names = inner.model.coordinates
+    beside = 0.0 if inner is system else 4.0 * CLOSED_BELOW * (1.0 + np.abs(moved).max(axis=-1, initial=0.0))
+    for contact in inner.model.contacts:
         place, position = names.index(contact.coordinate), float(contact.position)
         into = (np.asarray(contact.gap(moved[..., place])) == 0.0) & (contact.sign * moved[..., len(names) + place] < 0.0)
-        moved[..., place] = np.where(into, np.nextafter(position, position + contact.sign), moved[..., place])
-    return moved
+        back = np.nextafter(position, position + contact.sign) + contact.sign * beside
+        moved[..., place] = np.where(into, back, moved[..., place])
+    return from_gaps(system, moved)
 
 
 def held_by_contacts(system: System, states: np.ndarray) -> np.ndarray:
@@ -320,10 +357,9 @@ def held_values(system: System, state: np.ndarray, within: float, closed: int = 
     return found
 
 
-def _held(system: System, states: np.ndarray, window: Window) -> np.ndarray:
+def _held(system: System, states: np.ndarray, bounds: np.ndarray) -> np.ndarray:
     """States (..., n, d) in which some coordinates are held at contacts, alternating as `within_window` says."""
     names, turn = system.model.coordinates, np.arange(states.shape[-2]) // 2
-    bounds = np.asarray(window)
     reached: dict[int, list[float]] = {}
     for contact in system.model.contacts:
         place, position = names.index(contact.coordinate), float(contact.position)

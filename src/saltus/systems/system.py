@@ -330,11 +330,11 @@ def check_system(
     *,
     coordinates: int | None = None,
     several_contacts: bool = False,
-    own_coordinates: bool = False,
+    sums: bool = True,
 ) -> None:
     """Refuse anything but a System whose model has the contacts and the number of coordinates that `asking` is for.
 
-    If `own_coordinates`, contacts of the model may keep sums of coordinates.
+    Without `sums` its contacts and surfaces must each be those of a single coordinate.
 
     Raises
     ------
@@ -344,7 +344,7 @@ def check_system(
     if not isinstance(system, System):
         raise ParameterError(f"{asking} takes a System(model=..., load=..., impact=...), got {shown(system)}", "system")
     inner, names = system.in_gap_coordinates, system.model.coordinates
-    if inner is not system and not own_coordinates:
+    if inner is not system and not sums:
         raise ParameterError(
             f"{asking} works in coordinates that contacts hold one by one: give it system.in_gap_coordinates, which has "
             f"{', '.join(inner.model.coordinates)}",

@@ -215,7 +215,7 @@ class Explorer:
 
 def _check(system: System, function: str) -> None:
     """Refuse a system that a page cannot follow."""
-    check_system(system, function, several_contacts=True)
+    check_system(system, function, several_contacts=True, sums=False)
     if system.model.surfaces:
         raise ParameterError(f"a page follows no surfaces so far, and {type(system.model).__name__} has some", "system")
 

@@ -191,9 +191,11 @@ def lyapunov_many(
     ['at_half', 'end_theta', 'end_velocity', 'ending', 'error', 'exponent', 'later_half', 'period', 'positive', 'resolution']
     """
     check_run("lyapunov_many", system, periods, transient, tol)
-    if len(system.model.coordinates) > 1:
+    if len(system.model.coordinates) > 1 or system.in_gap_coordinates is not system:
         raise ParameterError(
-            "lyapunov_many works on models with one coordinate; lyapunov_spectrum takes any, one motion at a time", "system"
+            "lyapunov_many works on models with one coordinate and walls that stand still; lyapunov_spectrum takes any, one "
+            "motion at a time",
+            "system",
         )
     run = _Many(system, read_inputs(system, velocity, 0.0, parameters, coordinates), tol)
     started, captured = run.settle(run.begin(), transient)

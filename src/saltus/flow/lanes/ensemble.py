@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -97,7 +96,7 @@ def simulate_many(
     >>> ends.impact_count.values, float(ends.theta[2])
     (array([39, 39, 39]), -0.23568059529931645)
     """
-    check_system(system, "simulate_many", several_contacts=True, own_coordinates=True)
+    check_system(system, "simulate_many", several_contacts=True)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     options = EnsembleOptions(
         tol=tol,
@@ -109,15 +108,13 @@ def simulate_many(
     )
     side, threads = read_side(side), read_threads(threads)
     inputs, inner = read_inputs(system, velocity, time, parameters, coordinates), system.in_gap_coordinates
-    if inner is not system and (Sample.EXTREMA in options.sample or options.paths is not None):
+    if inner is not system and (Sample.EXTREMA in options.sample or options.paths):
         raise ParameterError(
-            "extrema and derivatives of many motions are those of coordinates that contacts hold one by one: give "
-            f"system.in_gap_coordinates, which has {', '.join(inner.model.coordinates)}",
+            "extrema of many motions, and their derivatives to parameters, are those of coordinates that contacts hold one by "
+            f"one: give system.in_gap_coordinates, which has {', '.join(inner.model.coordinates)}",
             "sample",
         )
-    followed = inputs_in_gaps(system, inputs)
-    result = run_ensemble(inner, followed, options, threads, progress, duration=duration, side=side, last=last)
-    return to_dataset(replace(result, system=system, inputs=inputs))
+    return to_dataset(run_ensemble(system, inputs, options, threads, progress, duration=duration, side=side, last=last))
 
 
 def run_ensemble(
@@ -133,6 +130,8 @@ def run_ensemble(
     captured: np.ndarray | None = None,
 ) -> EnsembleResult:
     """Compile the code that is not there yet, and run the trajectories; `captured` holds speeds of capture that are known."""
+    own, given = system, inputs
+    system, inputs = system.in_gap_coordinates, inputs_in_gaps(system, inputs)
     driver = compile_driver_aside(system.model.holds_coordinates)
     run = program(system, options.limits, options.paths)
     jobs = _jobs(system, run, inputs, options.periods, duration, side)
@@ -147,7 +146,7 @@ def run_ensemble(
     if driver is not None:
         compile_beside(driver, system.model.holds_coordinates)
     ends = lanes.run(jobs, threads, progress, total=float(np.sum(spans + 1)))
-    return EnsembleResult(system, inputs, options, jobs, ends)
+    return EnsembleResult(own, given, options, jobs, ends)
 
 
 def compiled_lanes(system: System, run: Program, options: EnsembleOptions, kept: int) -> Lanes:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,8 @@ from saltus.flow.lanes.inputs import Inputs
 from saltus.flow.lanes.options import EnsembleOptions, Sample
 from saltus.flow.lanes.threads import Ends, Jobs
 from saltus.flow.motion.events import Stop
-from saltus.systems import System
+from saltus.flow.motion.simulate import simulate
+from saltus.systems import System, arguments_of
 from saltus.taylor import FREQUENCY
 
 STOPS = {
@@ -133,6 +135,21 @@ class EnsembleResult:
                 found[Sample.STATE][:, i] = self._in_own_coordinates(whole if back else self.time, found[Sample.STATE][:, i])
         return found
 
+    def extrema_later(self, periods: np.ndarray, kept: int) -> np.ndarray:
+        """The largest and the least of all own coordinates in each of the next forcing periods, as many as are given (n,) and
+        `kept` at most, (n, kept, 2); nan before. Lanes record those of the coordinates that contacts hold one by one.
+        """
+        extrema, last, size = np.full((len(periods), kept, 2), np.nan), self.last, len(periods)
+        length = np.broadcast_to(self.jobs.rows["period_length"], size)
+        for row, count in enumerate(np.minimum(periods, kept).tolist()):
+            numbers = {path: float(np.broadcast_to(a, size)[row]) for path, a in self.inputs.parameters.items()}
+            system, state = self.system.with_(numbers), arguments_of(self.system, last[row])
+            for k in range(kept - count, kept):
+                motion = simulate(system, **state, duration=float(length[row]), tol=self.options.tol)
+                extrema[row, k] = motion.extrema[:, 1].max(), motion.extrema[:, 0].min()
+                state = arguments_of(system, motion.final_state)
+        return extrema
+
     @cached_property
     def derivatives(self) -> np.ndarray:
         """The derivatives of the end state to the initial one and to the parameters that were asked for, (n, d, d + parameters).
@@ -146,8 +163,13 @@ class EnsembleResult:
         q = ends.states[:, own:rows].reshape(-1, 2 * own + len(paths), own)
         v = ends.states[:, rows + own :].reshape(-1, 2 * own + len(paths), own)
         derivatives = np.concatenate([q, v], axis=2).transpose(0, 2, 1).copy()
-        rates = ends.rates[:, :own]
-        shifts = ends.rates[:, own:]
+        rates, shifts = ends.rates[:, :own], ends.rates[:, own:]
+        if (inner := self.system.in_gap_coordinates) is not self.system:  # their derivatives to parameters are not asked for
+            twin = self.inputs.with_numbers(inner)
+            out, into = (_twice(rows, len(derivatives)) for rows in (twin.model.from_gaps(), twin.model.sums()[0]))
+            derivatives = out @ derivatives @ into
+            bent = twin.model.own(self.time, [*rates.T] if own > 1 else rates[:, 0], twin.load, 2)
+            rates = np.column_stack(np.broadcast_arrays(self.time, *(bent if own > 1 else [bent])))[:, 1:]
         slope = np.concatenate([self.last[:, own:], rates], axis=1)
         limited = ends.rows["status"] == Status.LIMITED
         with np.errstate(invalid="ignore"):  # the instant at which a margin is reached without speed has no derivative
@@ -160,3 +182,13 @@ class EnsembleResult:
             shift = np.where(moving, -span * length / (2.0 * np.pi), 0.0)  # of the end, -span / W
             derivatives[:, :, 2 * own + paths.index(FREQUENCY)] += np.where(moving[:, None], shift[:, None] * slope, 0.0)
         return derivatives
+
+
+def _twice(rows: list[list[Any]], size: int) -> np.ndarray:
+    """A matrix of numbers, or of arrays with a number for each trajectory, for coordinates and for velocities, (n, d, d)."""
+    own = len(rows)
+    found = np.zeros((size, 2 * own, 2 * own))
+    for i, row in enumerate(rows):
+        for j, entry in enumerate(row):
+            found[:, i, j] = found[:, own + i, own + j] = entry
+    return found

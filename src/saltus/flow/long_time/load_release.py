@@ -99,6 +99,7 @@ def load_releases(system: System) -> tuple[Release, ...]:
     [1, -1]
     """
     check_system(system, "load_releases", several_contacts=True)
+    system = system.in_gap_coordinates
     if system.load.period is None:
         return ()
     sides = system.model.sides or range(1, 1 + len(system.model.contacts))

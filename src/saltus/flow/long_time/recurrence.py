@@ -297,8 +297,8 @@ def find_recurrence(
     progress
         Called with the fraction done.
     """
-    limits = limits_of(system, ())
-    sampled = {Sample.STATE: kept != 0, Sample.EXTREMA: extrema, Sample.IMPACT_COUNT: impact_count}
+    limits, beside = limits_of(system, ()), extrema and system.in_gap_coordinates is not system
+    sampled = {Sample.STATE: kept != 0, Sample.EXTREMA: extrema and not beside, Sample.IMPACT_COUNT: impact_count}
     sampled[Sample.SPEED] = speed and system.model.names_its_contacts
     size = periods if kept is None else kept
     options = EnsembleOptions(
@@ -316,7 +316,11 @@ def find_recurrence(
     found = replace(_read(result), outcome=_outcome(result, parameters is not None))
     if found.extrema is not None and not options.from_start:
         found.extrema[~result.stopped(Stop.HORIZON, Stop.REST, Stop.SETTLED)] = np.nan
-    return _with_periods(found, result.recurrence_period if stop_early else None, max_period, settings)
+    found = _with_periods(found, result.recurrence_period if stop_early else None, max_period, settings)
+    if not beside:
+        return found
+    gone = found.ended if options.from_start else found.ended | found.rest
+    return replace(found, extrema=result.extrema_later(np.where(gone, 0, np.where(found.period, found.period, last)), last))
 
 
 def motions_from(system: System, states: np.ndarray, **options: Any) -> xarray.Dataset:
@@ -410,6 +414,7 @@ def _outcome(result: EnsembleResult, varied: bool) -> np.ndarray:
 def _rest_lasts(system: System) -> bool:
     """Whether it is known that the load never pulls a system off its rest; with several contacts, each must hold one
     coordinate."""
+    system = system.in_gap_coordinates
     contacts, names = system.model.contacts, system.model.coordinates
     known = not contacts or sorted(contact.coordinate for contact in contacts) == sorted(names)
     known &= not (system.model.frictions or system.model.surfaces)

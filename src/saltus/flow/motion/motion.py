@@ -23,6 +23,10 @@ if TYPE_CHECKING:
 PERIOD_SAMPLES = 200  # samples in a forcing period if no times are given
 
 
+# Of a step, where velocities are looked at, up to the impact that may end it.
+SHARES = np.append(np.arange(8) / 8, 1.0 - 2.0**-30)
+
+
 @dataclass(frozen=True, eq=False)
 class Samples:
     """States at given times: `time` (n,), `position` and `velocity` (degrees of freedom, n), `side` (n,), 0 at rest."""
@@ -207,6 +211,40 @@ class Motion(Result):
         position[:, end], velocity[:, end] = np.reshape(self.position, (-1, 1)), np.reshape(self.velocity, (-1, 1))
         side[end] = self.side
         return position, velocity, side
+
+    @cached_property
+    def extrema(self) -> np.ndarray:
+        """The least and the largest value of each coordinate, (degrees of freedom, 2).
+
+        Raises
+        ------
+        ParameterError
+            The motion was computed with dense=False.
+        """
+        self._check_times(np.empty(0))
+        ends, dense = np.array([self.start, self.time]), self.dense
+        steps = np.empty((0, 2)) if dense is None else np.stack([dense.start, dense.start + dense.length], axis=1)
+        times = np.clip(steps[:, :1] + SHARES * np.diff(steps, axis=1), *ends)
+        position, velocity, _ = self._states(np.append(times.ravel(), ends))
+        found = []
+        for i, (x, v) in enumerate(zip(position, velocity, strict=True)):
+            rate = v[:-2].reshape(times.shape)
+            turns = rate[:, :-1] * rate[:, 1:] < 0.0
+            x = np.append(x, self._turned(i, times[:, :-1][turns], times[:, 1:][turns]))
+            found.append((x.min(), x.max()))
+        return np.array(found)
+
+    def _turned(self, place: int, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+        """A coordinate where its velocity is 0 between two times, of which it has different signs, (n,) each: by regula falsi,
+        in which the value at an end that stays is halved. The coordinate's error is the square of that of the time."""
+        a, b = (self._states(times)[1][place] for times in (low, high))
+        for _ in SHARES:
+            middle = low - a * (high - low) / np.where(a == b, 1.0, b - a)
+            now = self._states(middle)[1][place]
+            same = now * b > 0.0  # the root lies before
+            a, b = np.where(same, 0.5 * a, now), np.where(same, now, 0.5 * b)
+            low, high = np.where(same, low, middle), np.where(same, middle, high)
+        return self._states(middle)[0][place] if low.size else low
 
     @cached_property
     def validity(self) -> Validity:

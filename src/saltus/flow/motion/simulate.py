@@ -100,7 +100,7 @@ class MotionRequest:
     sample_times: np.ndarray | None = field(init=False)
 
     def __post_init__(self) -> None:
-        check_system(self.system, "simulate", several_contacts=True, own_coordinates=True)
+        check_system(self.system, "simulate", several_contacts=True)
         for name, value in self._read().items():
             object.__setattr__(self, name, value)
 

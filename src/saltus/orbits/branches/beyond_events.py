@@ -325,7 +325,7 @@ def _section_comes(point: OrbitPoint) -> bool:
 def _from_another_section(point: OrbitPoint) -> OrbitPoint | None:
     """The same orbit with its section at a phase farther from all events, and with its tangent there."""
     equations: Any = point.orbit.equations
-    phase, state = section_of(point.orbit.motion(), point.orbit.frequency)
+    phase, state = section_of(point.orbit.followed, point.orbit.frequency)
     moved = equations.with_signature(replace(equations.signature, section=phase))
     near = point.beside(SETTINGS.along)
     first = PeriodicOrbit.near(moved, state, point.parameters)

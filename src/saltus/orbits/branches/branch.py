@@ -130,7 +130,7 @@ def branch_dataset(branch: Branch) -> xarray.Dataset:
     attributes: dict[str, Any] = {
         "kind": "branch",
         "path": branch.path,
-        "coordinate": " ".join(equations.system.model.coordinates),
+        "coordinate": " ".join(equations.given.model.coordinates),
         "ends": [str(end) for end in branch.ends],
         "end_reasons": [end.reason.code for end in branch.ends],
         "end_kinds": [str(end.kind) for end in branch.ends],
@@ -138,12 +138,12 @@ def branch_dataset(branch: Branch) -> xarray.Dataset:
         "closed": int(branch.closed),
         "missed": "; ".join(map(str, branch.missed)),
     }
-    return xarray.Dataset(data, attrs=provenance(equations.system, tol=equations.tol, **attributes))
+    return xarray.Dataset(data, attrs=provenance(equations.given, tol=equations.tol, **attributes))
 
 
 def _columns(orbits: list[PeriodicOrbit]) -> list[tuple[str, np.ndarray, dict[str, str]]]:
     """The quantities that are one number for each orbit."""
-    model = orbits[0].equations.system.model
+    model = orbits[0].equations.given.model
     angle, coordinate = {"units": model.unit_of(model.coordinates[0])}, " or ".join(model.coordinates)
 
     def column(value: Any, kind: Any = float) -> np.ndarray:

@@ -232,7 +232,7 @@ def restarted(restart: Restart, point: OrbitPoint) -> OrbitPoint | End:
     equations, period = point.orbit.equations, point.orbit.period
     for values in restart.values:
         try:
-            system = equations.system_at(values)
+            system = equations.given_at(values)
             motion = simulate(system, **restart.state, periods=SETTINGS.settling * period, dense=False)
             state = arguments_of(system, motion.final_state)
             base = equations_of(system, Signature((), 1), equations.paths, equations.tol)

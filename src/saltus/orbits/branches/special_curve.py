@@ -171,7 +171,7 @@ class SpecialCurve(Result, Course[SpecialCurvePoint, SpecialPoint]):
         import xarray
 
         orbits, equations = self.orbits, self.orbits[0].equations
-        model = equations.system.model
+        model = equations.given.model
         name = model.coordinates[0]
         angle = {"units": model.unit_of(name), "long_name": f"max abs({name})"}
         data: dict[str, Any] = {
@@ -191,7 +191,7 @@ class SpecialCurve(Result, Course[SpecialCurvePoint, SpecialPoint]):
             "end_reasons": [end.reason.code for end in self.ends],
             "closed": int(self.closed),
         }
-        known = provenance(equations.system, tol=equations.tol, **attributes)
+        known = provenance(equations.given, tol=equations.tol, **attributes)
         return xarray.Dataset(data, coords={"path": list(self.paths)}, attrs=known)
 
     def __repr__(self) -> str:

@@ -84,7 +84,7 @@ class ContactsEquations(OrbitEquations):
         if motion.twice.limit is not None or len(motion.twice.events.of(EventKind.HELD)):
             return None
         signature, first, phases = read_signature(motion.twice, motion.periods, base.frequency(base.values))
-        found = cls(base.system, signature, base.paths, base.tol)
+        found = cls(base.given, signature, base.paths, base.tol)
         if not found.size:
             raise MotionError(STAYS)
         return found, found.joined(first, phases)

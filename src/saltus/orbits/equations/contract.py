@@ -129,6 +129,9 @@ class MotionToRead:
 class OrbitEquations(ABC):
     """The equations F(unknowns, parameters) = 0 of the orbits of one signature of a system, with the parameters at `paths`.
 
+    They are those of `given.in_gap_coordinates`, the `system`, whose contacts hold single coordinates; so are `start` and all
+    states. `PeriodicOrbit` shows them in the coordinates of the system that was `given`.
+
     A new kind of equations is a subclass in a file of its own and one entry in `KINDS` (`kinds.py`). It gives
 
     1. **for which orbits it is**: `solves`, whether it has equations for a signature of a system; and `read`, the equations and
@@ -167,7 +170,8 @@ class OrbitEquations(ABC):
             raise ParameterError(
                 "a load without a frequency has no forcing period, so no periodic orbits to find; give one", "load.frequency"
             )
-        self.system, self.signature, self.paths, self.tol = system, signature, paths, tol
+        self.given, self.signature, self.paths, self.tol = system, signature, paths, tol
+        self.system = system = system.in_gap_coordinates
         self._run = _ready(system, paths)
         if self._run.trace.records:
             raise ParameterError(
@@ -181,7 +185,7 @@ class OrbitEquations(ABC):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle and copy the arguments only: compiled code is loaded again in the process that reads them."""
-        return type(self), (self.system, self.signature, self.paths, self.tol)
+        return type(self), (self.given, self.signature, self.paths, self.tol)
 
     # --- 1. for which orbits it is -------------------------------------------------------------------------------------------
 
@@ -368,11 +372,15 @@ class OrbitEquations(ABC):
         ParameterError
             Where it refuses them.
         """
-        return self.system.with_({path: float(value) for path, value in zip(self.paths, values, strict=True)})
+        return self.given_at(values).in_gap_coordinates
+
+    def given_at(self, values: np.ndarray) -> System:
+        """The system as the user gave it, with the given parameters; an orbit's states are given in its coordinates."""
+        return self.given.with_({path: float(value) for path, value in zip(self.paths, values, strict=True)})
 
     def with_signature(self, signature: Signature) -> Self:
         """The equations of the same kind for another signature."""
-        return type(self)(self.system, signature, self.paths, self.tol)
+        return type(self)(self.given, signature, self.paths, self.tol)
 
     @cached_property
     def images(self) -> tuple[int, ...]:

@@ -90,7 +90,7 @@ class WholeMotionEquations(OrbitEquations):
         if twice.stop is Stop.REST and not (len(twice.events) and twice.events[-1].time > 0.5 * (twice.start + twice.time)):
             raise MotionError(STAYS)
         phase, state = section_of(twice, base.frequency(base.values), duration=motion.duration)
-        return cls(system, Signature((), periods, section=phase), base.paths, base.tol), state
+        return cls(base.given, Signature((), periods, section=phase), base.paths, base.tol), state
 
     @property
     def size(self) -> int:
@@ -140,7 +140,7 @@ class WholeMotionEquations(OrbitEquations):
         return point if found is None else other.curve.with_tangent(found, other.tangent) or point
 
     def at_another_section(self, orbit: PeriodicOrbit) -> PeriodicOrbit | None:
-        phase, state = section_of(orbit.motion(), orbit.frequency)
+        phase, state = section_of(orbit.followed, orbit.frequency)
         moved = self.with_signature(replace(self.signature, section=phase))
         return PeriodicOrbit.near(moved, state, orbit.solution.values)
 

@@ -232,7 +232,7 @@ def simplest(orbit: PeriodicOrbit) -> PeriodicOrbit:
 def _is_symmetric(equations: OrbitEquations) -> bool:
     """Whether a system has the mirror symmetry, for all parameters at the equations' paths."""
     paths = equations.paths
-    return keeps_symmetry(equations.system, paths[0]) if paths else is_symmetric(equations.system)
+    return keeps_symmetry(equations.given, paths[0]) if paths else is_symmetric(equations.given)
 
 
 @dataclass(frozen=True)
@@ -280,7 +280,9 @@ def orbits_near_returns(
     for period in range(1, min(max_period, states.shape[2] - 1) + 1):
         guesses = [_guesses(at_value, period) for at_value in states]
         rows = np.repeat(np.arange(len(values)), [len(at_value) for at_value in guesses])
-        improved, good = _improved(system, path, values[rows], np.concatenate(guesses), period)
+        begin = np.concatenate(system.to_gaps(0.0, *np.split(np.concatenate(guesses).T, 2))).T
+        improved, good = _improved(system.in_gap_coordinates, path, values[rows], begin, period)
+        improved = np.concatenate(system.from_gaps(0.0, *np.split(improved.T, 2))).T
         for row, state in zip(rows[good].tolist(), improved[good], strict=True):
             if len(known[row]) and np.abs(known[row] - state).max(axis=1).min() < NEAR_RETURNS.same_state:
                 continue
