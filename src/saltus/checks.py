@@ -61,6 +61,8 @@ def check_number(name: str, value: Any, **bounds: Any) -> None:
     ParameterError
         The error has the name, the range and the value, and a hint if the number is likely in degrees.
     """
+    if not bounds and type(value) is float and abs(value) <= LIMITS.value:
+        return
     problem = number_problem(value, **bounds)
     if problem is not None:
         raise ParameterError(f"{name} {problem}", name)
@@ -357,10 +359,18 @@ def settle_numbers(owner: Any, *names: str, **bounds: Any) -> None:
 
     The unit of a field is that of its metadata, as in `field(metadata=RADIANS)`.
     """
-    units = {f.name: f.metadata.get("unit", "") for f in dataclasses.fields(owner)}
+    kind: Any = type(owner)
     for name in names:
-        check_number(name, getattr(owner, name), unit=units[name], **bounds)
-        object.__setattr__(owner, name, float(getattr(owner, name)))
+        value = getattr(owner, name)
+        if bounds or type(value) is not float or not abs(value) <= LIMITS.value:
+            check_number(name, value, unit=_units_of(kind)[name], **bounds)
+            object.__setattr__(owner, name, float(value))
+
+
+@functools.cache
+def _units_of(kind: type) -> dict[str, str]:
+    """The unit of each field of a dataclass."""
+    return {f.name: f.metadata.get("unit", "") for f in dataclasses.fields(kind)}
 
 
 def check_environment() -> None:

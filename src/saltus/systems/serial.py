@@ -12,6 +12,8 @@ from functools import cache
 from importlib import import_module
 from typing import Any, TypeVar
 
+import numpy as np
+
 from saltus.errors import ParameterError, SaltusError, near, shown
 from saltus.systems.gap_coordinates import IN_GAPS, in_gap_coordinates
 from saltus.systems.impact_laws import Factors, ImpactLaw
@@ -41,6 +43,17 @@ def is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
+def is_fixed(node: Any) -> bool:
+    """Whether nothing below `node` can change: frozen classes, arrays that cannot be written, and what can be the key of a
+    dictionary."""
+    if isinstance(node, np.ndarray):
+        return not node.flags.writeable
+    settings = getattr(type(node), "__dataclass_params__", None)
+    if settings is None or isinstance(node, Factors):
+        return type(node).__hash__ is not None
+    return settings.frozen and all(type(part) is float or is_fixed(part) for part in children(node).values())
+
+
 def numbers(node: Any, prefix: str = "") -> Iterator[tuple[str, float]]:
     """Every number below `node` with its dotted path; a `Constant` is the path of its channel."""
     if isinstance(node, Constant):
@@ -48,9 +61,11 @@ def numbers(node: Any, prefix: str = "") -> Iterator[tuple[str, float]]:
         return
     for name, child in children(node).items():
         path = f"{prefix}.{name}" if prefix else name
-        if is_number(child):
+        if type(child) is float:
+            yield path, child
+        elif is_number(child):
             yield path, float(child)
-        else:
+        elif child is not None:
             yield from numbers(child, path)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from saltus.systems.impact_laws import ImpactLaw, VelocityReduction
 from saltus.systems.load import Load
 from saltus.systems.model import Model, OneContactModel
 from saltus.systems.model_checks import check_contact, check_works
-from saltus.systems.serial import children, from_dict, numbers, replace, to_dict
+from saltus.systems.serial import children, from_dict, is_fixed, numbers, replace, to_dict
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,11 +69,26 @@ class System:
                     f"{type(self.model).__name__} does not read load.{channel}; {near(channel, known)}", f"load.{channel}"
                 )
         self.model.check_load(self.load)
-        has_sums = check_works(self.model)
-        _check_impact(self.model, self.impact)
-        if has_sums:  # refuses sums that cannot be coordinates
+        if _passes(self.model, self.impact):  # refuses sums that cannot be coordinates
             inner = System(model=in_gap_coordinates(self.model), load=self.load, impact=self.impact)
             object.__setattr__(self, "_in_gaps", inner)
+
+    def _remembered(self, what: Any, make: Callable[[], Any]) -> Any:
+        """What follows from this system alone, made when it is first asked for; for those who make a motion of it.
+
+        A copy makes it anew, and so does at every time a system of which a part may change, as an array or a class that is not
+        frozen does.
+        """
+        memory = vars(self).get("_memory")
+        if memory is None:
+            memory = vars(self).setdefault("_memory", {} if is_fixed(self) else ())
+        if what in memory:
+            return memory[what]
+        made = make()
+        return memory.setdefault(what, made) if isinstance(memory, dict) else made
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "_memory"}
 
     def _repr_html_(self) -> str:
         parts = {name: type(getattr(self, name)).__name__ for name in ("model", "impact")}
@@ -288,6 +303,28 @@ class System:
         import tomllib
 
         return cls.from_dict(_parsed(text, tomllib.loads, "TOML"))
+
+
+class _Passed(NamedTuple):
+    """A model and an impact law that have passed their checks, and whether the model has contacts of sums of coordinates."""
+
+    model: Any = None
+    impact: Any = None
+    has_sums: bool = False
+
+
+_passed = _Passed()  # the last ones: `with_` makes systems by the thousand whose loads alone differ
+
+
+def _passes(model: Model, impact: ImpactLaw) -> bool:
+    """Refuse a model and an impact law that cannot be simulated; returns whether contacts of it are of sums of coordinates."""
+    global _passed
+    last = _passed
+    if last.model is not model or last.impact is not impact or not is_fixed(model):
+        has_sums = check_works(model)
+        _check_impact(model, impact)
+        _passed = last = _Passed(model, impact, has_sums)
+    return last.has_sums
 
 
 def _check_parts(system: System) -> None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from types import FunctionType
@@ -342,16 +342,38 @@ def _text(traced: Trace, roots: list[Expr]) -> str:
 # --- the key of a structure -----------------------------------------------------------------------------------------------------
 
 
-def structure_key(node: Any) -> Any:
+def structure_key(system: System) -> Any:
     """A key of a system's structure, under which traces are kept: the types of its parts, the values that these read from their
-    modules, and all of their fields that are no numbers."""
+    modules, and all of their fields that are no numbers. If these values have changed, the system remembers nothing."""
+    spaces, read, key = system._remembered("structure", lambda: ((s := tuple(_spaces(system))), _values(s), _key(system)))
+    if _values(spaces) == read:
+        return key
+    vars(system).pop("_memory", None)
+    return structure_key(system)
+
+
+def _spaces(node: Any) -> Iterator[tuple[Mapping[str, Any], str]]:
+    parts: dict[str, Any] = {} if isinstance(node, Record) else children(node)
+    kind: Any = type(node)
+    if parts:
+        yield from _outside(kind)
+    for part in parts.values():
+        if type(part) is not float:
+            yield from _spaces(part)
+
+
+def _values(spaces: tuple[tuple[Mapping[str, Any], str], ...]) -> tuple[Any, ...]:
+    return tuple(space.get(name) for space, name in spaces)
+
+
+def _key(node: Any) -> Any:
+    kind: Any
     if isinstance(node, Record):  # its samples and its scale are numbers; the file that they came from does not matter
         return Record, node.quantity
-    parts = children(node)
+    parts, kind = children(node), type(node)
     if parts:
-        owner: Any = type(node)
-        outside = tuple(space.get(name) for space, name in _outside(owner))
-        return owner, outside, tuple((name, structure_key(part)) for name, part in parts.items())
+        named = [(name, float if type(part) is float else _key(part)) for name, part in parts.items()]
+        return kind, _values(_outside(kind)), tuple(named)
     if is_number(node):
         return float
     if isinstance(node, np.ndarray):

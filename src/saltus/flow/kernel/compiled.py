@@ -348,8 +348,7 @@ def values_function(name: str, roots: list[Expr]) -> WrittenFunction:
 
 def _table(name: str, places: Places, roots: list[Expr], known: dict[Expr, int]) -> WrittenFunction:
     """A function that fills its last argument with the values of expressions of the parameters."""
-    targets = [(places.arguments[-1], i) for i in range(len(roots))]
-    return _function(name, places, [Case(tape(roots, known), targets)])
+    return _function(name, places, [Case(tape(roots, known), [(places.arguments[-1], i) for i in range(len(roots))])])
 
 
 @dataclass(frozen=True)
@@ -370,13 +369,18 @@ class Program:
 
 def program(system: System, limits: tuple[str, ...] | None = None, sensitivities: tuple[str, ...] | None = None) -> Program:
     """A system ready to run, by default with the margins that end a motion in any case, and with a tangent if asked for. Its
-    structure is traced and compiled unless it is known; its numbers are only filled in."""
-    limits = limits_of(system, ()) if limits is None else limits
-    key = (structure_key(system), limits, sensitivities)
-    if key not in _structures:
-        traced = trace(system, limits, sensitivities)
-        _structures[key] = traced, load_structure(traced)
-    traced, structure = _structures[key]
+    structure is traced and compiled unless it is known; its numbers are filled in at the first time."""
+    limits, key = limits_of(system, ()) if limits is None else limits, structure_key(system)
+    run: Program = system._remembered((limits, sensitivities), lambda: _made(system, (key, limits, sensitivities)))
+    copied = (run.env[0].copy(), *run.env[1:])  # with several contacts the kernel writes which coordinates are free
+    return replace(run, env=copied) if run.structure.several else run
+
+
+def _made(system: System, asked: tuple[Any, ...]) -> Program:
+    if asked not in _structures:
+        traced = trace(system, *asked[1:])
+        _structures[asked] = traced, load_structure(traced)
+    traced, structure = _structures[asked]
     parameters = np.array([value for _, value in numbers(system)])
     return Program(traced, structure, *structure.prepare(parameters, record_table(system, traced.records)), tuple(traced.margins))
 
@@ -386,9 +390,9 @@ _structures: dict[Any, tuple[Trace, Structure]] = {}
 
 def limits_of(system: System, stop_at: Iterable[str]) -> tuple[str, ...]:
     """The margins that end a motion: the model's own stops and those asked for."""
-    lifted = [friction.limit for friction in system.model.frictions]
-    asked = check_names("stop_at", stop_at, "margins, such as ['kinematic_limit']")
-    return tuple(dict.fromkeys((*system.model.stops, *lifted, *asked)))
+    model, asked = system.model, check_names("stop_at", stop_at, "margins, such as ['kinematic_limit']")
+    own = system._remembered("limits", lambda: (*model.stops, *(friction.limit for friction in model.frictions)))
+    return tuple(dict.fromkeys((*own, *asked)))
 
 
 def taylor_order(tol: float) -> int:

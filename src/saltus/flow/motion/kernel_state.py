@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -21,6 +22,10 @@ from saltus.flow.motion.validity import DenseOutput, Validity, ValidityCheck
 
 if TYPE_CHECKING:
     from saltus.flow.motion.simulate import MotionRequest
+    from saltus.systems import System
+
+
+NO_ROWS = np.zeros((0, len(ContactColumn)), dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,9 +34,9 @@ class KernelState:
 
     array: np.ndarray  # one record MOTION
     state: np.ndarray  # coordinates and velocities, each followed by the tangent's columns, and the shifts
-    rows: np.ndarray = field(default_factory=lambda: np.zeros((0, len(ContactColumn)), dtype=np.int64))  # of several contacts
+    rows: np.ndarray = field(default_factory=lambda: NO_ROWS)  # of several contacts
 
-    @property
+    @cached_property
     def numbers(self) -> Any:
         """The numbers of the motion, by the names of MOTION."""
         return self.array[0]
@@ -49,7 +54,7 @@ class KernelState:
         now = array[0]
         now["period"], now["last_period"] = int(at.first), int(at.last)
         now["time"], now["end"], now["period_length"], now["tolerance"] = at.local, at.end, at.length, request.tol
-        now["piece"] = np.searchsorted(run.env[2], request.time, side="right")
+        now["piece"] = run.env[2].searchsorted(request.time, side="right") if run.env[2].size else 0
         now["leave_by"] = request.side or 0
         now["dense"] = int(request.dense or request.sample_times is not None)
         now["mode"], now["side"] = _mode_and_side(request, run)
@@ -65,12 +70,14 @@ class KernelState:
     @property
     def time(self) -> float:
         """The dimensionless time."""
-        return float(self.numbers["period"] * self.numbers["period_length"] + self.numbers["time"])
+        now = self.numbers
+        return int(now["period"]) * float(now["period_length"]) + float(now["time"])
 
     @property
     def end_time(self) -> float:
         """The time at which the motion ends, unless something ends it earlier."""
-        return float(self.numbers["last_period"] * self.numbers["period_length"] + self.numbers["end"])
+        now = self.numbers
+        return int(now["last_period"]) * float(now["period_length"]) + float(now["end"])
 
     @property
     def position(self) -> np.ndarray:
@@ -83,9 +90,14 @@ class KernelState:
         return self.state[self.numbers["dof"] : self.numbers["dof"] + self.numbers["own"]]
 
     @property
+    def mode(self) -> int:
+        """A `Mode`."""
+        return int(self.numbers["mode"])
+
+    @property
     def side(self) -> int:
         """+1 or -1, and 0 at rest."""
-        return 0 if self.numbers["mode"] in (Mode.REST, Mode.CHATTER) else int(self.numbers["side"])
+        return 0 if self.mode in (Mode.REST, Mode.CHATTER) else int(self.numbers["side"])
 
     @property
     def columns(self) -> np.ndarray:
@@ -97,23 +109,31 @@ class KernelState:
 
 
 def _mode_and_side(request: MotionRequest, run: Program) -> tuple[int, int]:
-    model = request.system.model
-    position, speed = float(request.position[0]), float(request.speeds[0])
-    if model.holds_coordinates:
+    if run.structure.several:
         return Mode.CONTACT, 0
-    mode, side = side_of_state(len(model.sides), position, speed, run.model.geometry)
+    position, speed = float(request.position[0]), float(request.speeds[0])
+    mode, side = side_of_state(run.structure.sizes.sides, position, speed, run.model.geometry.tolist())
     if mode == Mode.BEYOND:
-        name = model.coordinates[0]
+        model, name = request.system.model, request.system.model.coordinates[0]
         raise ParameterError(f"{name} = {position:g} lies beyond the contact at {name} = {float(model.contact):g}", name)
     return mode, side
 
 
 def _first_state(run: Program, position: np.ndarray, speeds: np.ndarray) -> np.ndarray:
     """Coordinates and velocities, each followed by the tangent's columns, and the shifts."""
-    columns = run.structure.sizes[-1]
+    columns = run.structure.sizes.columns
+    if not columns:
+        return np.concatenate([position, speeds])
     start = np.eye(columns, 2 * position.size)  # row j is the initial value of column j
     u, z = start[:, : position.size].ravel(), start[:, position.size :].ravel()
     return np.concatenate([position, u, speeds, z, np.zeros(columns)])
+
+
+def _parts(system: System) -> tuple[Any, Any, Any]:
+    """The contacts, frictions and surfaces of a system's model, which may make them anew whenever they are asked for."""
+    model, found = system.model, system._remembered
+    parts: tuple[Any, Any, Any] = found("parts", lambda: (model.contacts, model.frictions, model.surfaces))
+    return parts
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,13 +150,14 @@ class ContactState(KernelState):
             The state lies beyond a contact, or moves into a contact that it is at.
         """
         start = super().at_start(request, run)
-        names, position, speeds = request.system.model.coordinates, request.position, request.speeds
+        names, position, speeds = request.system.model.coordinates, request.position.tolist(), request.speeds.tolist()
+        own_contacts, own_frictions, surfaces = _parts(request.system)
         held, rubbed = run.trace.contact_coordinates, run.trace.friction_coordinates
-        contacts = np.zeros((len(held) + len(rubbed), len(ContactColumn)), dtype=np.int64)
+        contacts = np.zeros((len(held) + len(rubbed), NO_ROWS.shape[1]), dtype=np.int64)
         contacts[:, ContactColumn.COORDINATE] = held + tuple(max(place, -1 - place) for place in rubbed)
-        for row, contact in zip(contacts[: len(held)], request.system.model.contacts, strict=True):
+        for row, contact in zip(contacts[: len(held)], own_contacts, strict=True):
             place = names.index(contact.coordinate)
-            gap, rate = contact.gap(float(position[place])), contact.sign * float(speeds[place])
+            gap, rate = contact.gap(position[place]), contact.sign * speeds[place]
             if gap < 0.0 or (gap == 0.0 and rate < 0.0):
                 where = f"{contact.coordinate} = {position[place]:g}"
                 what = f"lies beyond the contact {contact.name!r}" if gap < 0.0 else f"moves into the contact {contact.name!r}"
@@ -145,10 +166,9 @@ class ContactState(KernelState):
             row[ContactColumn.SKIP] = int(gap == 0.0)
             if gap == 0.0:
                 start.state[place] = float(contact.position)
-        for row, friction in zip(contacts[len(held) :], request.system.model.frictions, strict=False):
-            rate = float(speeds[names.index(friction.coordinate)]) - float(friction.ground_speed)
+        for row, friction in zip(contacts[len(held) :], own_frictions, strict=False):
+            rate = speeds[names.index(friction.coordinate)] - float(friction.ground_speed)
             row[FrictionColumn.SLIDES] = int(np.sign(rate))
-        surfaces = request.system.model.surfaces
         for row, surface in zip(contacts[len(contacts) - len(surfaces) :], surfaces, strict=True):
             place = names.index(surface.coordinate)
             row[FrictionColumn.MARGIN] = NoMargin.SURFACE
@@ -179,6 +199,14 @@ class RecorderSettings:
 MOST = RecorderSettings()
 
 
+FIELDS = ("start", "length", "side", "series")
+
+
+def joined(chunks: list[np.ndarray]) -> np.ndarray:
+    """Arrays one after the other; the same array where there is one."""
+    return chunks[0] if len(chunks) == 1 else np.concatenate(chunks)
+
+
 class Recorder:
     """Takes the contents of the kernel's buffers whenever these are full.
 
@@ -186,33 +214,37 @@ class Recorder:
     the samples and the events.
     """
 
-    def __init__(self, request: MotionRequest, order: int, columns: int) -> None:
-        kept = request.dense or request.sample_times is not None
-        dof, size = len(request.system.model.coordinates), MOST.buffer if kept else 8
-        self._own, rows = dof, dof * (1 + columns) if request.dense and request.sample_times is None else dof
+    def __init__(self, request: MotionRequest, run: Program, order: int) -> None:
+        self._system, self._times, self._columns = request.system, request.sample_times, run.structure.sizes.columns
+        self._own, self._several = run.structure.sizes.own, run.structure.several
+        kept, wide = request.dense or request.sample_times is not None, request.dense and request.sample_times is None
+        size, rows = MOST.buffer if kept else 8, self._own * (1 + self._columns if wide else 1)
         self.steps = StepBuffers(np.empty((size, 2), dtype=np.int64), np.empty((size, 2)), np.empty((size, rows, order + 2)))
-        model = request.system.model
-        self._contacts = [contact.name for contact in model.contacts]
-        self._frictions = [*(friction.name for friction in model.frictions), *(surface.name for surface in model.surfaces)]
-        self._several = model.holds_coordinates
-        self._width = 1 + 2 * dof + len(self._contacts) if self._several else 3  # the numbers of an event before its shifts
-        self.events = EventBuffers(np.empty((MOST.buffer, 4), dtype=np.int64), np.empty((MOST.buffer, self._width + columns)))
+        # The numbers of an event before its shifts:
+        self._width = 1 + 2 * self._own + len(run.structure.signs) if self._several else 3
+        self.events = EventBuffers(
+            np.empty((MOST.buffer, 4), dtype=np.int64), np.empty((MOST.buffer, self._width + self._columns))
+        )
         self.total = 0  # events so far
         self._kept = 0  # steps so far
-        self._length, self._times = float(request.clock.length), request.sample_times
+        self._length = float(request.clock.length)
         self._pieces: list[DenseOutput] = []
         self._events: list[tuple[np.ndarray, ...]] = []
         self._samples: list[tuple[np.ndarray, ...]] = []
         self._next = 0  # index of the first sample time that is still to come
-        self._check = ValidityCheck(request.system)
+
+    @cached_property
+    def _check(self) -> ValidityCheck:
+        return ValidityCheck(self._system)
 
     def empty_buffers(self, numbers: Any) -> None:
         """Empty the buffers."""
-        labels, spans, series = (a[: numbers["recorded_steps"]].copy() for a in self.steps)
-        if labels.size:
+        steps, events = int(numbers["recorded_steps"]), int(numbers["recorded_events"])
+        if steps:
+            labels, spans, series = (a[:steps].copy() for a in self.steps)
             self._add(DenseOutput(labels[:, 0] * self._length + spans[:, 0], spans[:, 1], labels[:, 1], series))
-        self._events.append(tuple(a[: numbers["recorded_events"]].copy() for a in self.events))
-        self.total += int(numbers["recorded_events"])
+        self._events.append(tuple([a[:events].copy() for a in self.events]))
+        self.total += events
         numbers["recorded_steps"] = numbers["recorded_events"] = 0
 
     def _add(self, piece: DenseOutput) -> None:
@@ -233,7 +265,7 @@ class Recorder:
     def _check_memory(self, piece: DenseOutput) -> None:
         """Refuse to keep more steps than there is room for; at the end all of them are copied once. Steps of stiff motions are so
         short that the number of forcing periods says nothing about it."""
-        size = self._kept / piece.start.size * sum(a.nbytes for a in (piece.start, piece.length, piece.side, piece.series))
+        size = self._kept / piece.start.size * (piece.series.nbytes + 24 * piece.start.size)
         free = free_memory() if size > LIMITS.any_machine else np.inf
         if size > LIMITS.memory * free:
             raise MotionError(
@@ -251,29 +283,39 @@ class Recorder:
         """The contacts, by number, that the impacts in the last buffer closed."""
         labels = self._events[-1][0]
         bits = np.bitwise_or.reduce(labels[labels[:, 1] == EventCode.IMPACT, 2], initial=0)
-        return [i for i in range(len(self._contacts)) if bits >> i & 1]
+        return [i for i in range(len(_parts(self._system)[0])) if bits >> i & 1]
 
     def all_events(self) -> MotionEvents:
         """All events of the motion."""
-        labels, values = (np.concatenate([chunk[i] for chunk in self._events]) for i in (0, 1))
+        labels, values = (joined([chunk[i] for chunk in self._events]) for i in (0, 1))
         times, values = labels[:, 0] * self._length + values[:, 0], values[:, : self._width]
         if self._several:
-            return ContactEvents(times, labels, values, self._contacts, self._frictions)
+            contacts, *others = _parts(self._system)
+            names = [part.name for part in contacts], [part.name for parts in others for part in parts]
+            return ContactEvents(times, labels, values, *names)
         return MotionEvents(times, labels, values)
 
     def event_shifts(self) -> np.ndarray:
         """The shift of each event along each column of the tangent, (events, columns); nan where it is not known."""
-        return np.concatenate([values[:, self._width :] for _, values in self._events])
+        return joined([values[:, self._width :] for _, values in self._events])
 
-    def dense(self) -> tuple[DenseOutput | None, DenseOutput | None]:
-        """The dense output of the motion, and of its columns, the coordinates of one after those of the other; None
-        if it was not kept."""
+    def dense(self) -> DenseOutput | None:
+        """The dense output of the motion; None if it was not kept."""
+        return self._output(0, self._own)
+
+    def tangent(self) -> DenseOutput | None:
+        """That of its columns, the coordinates of one after those of the other; None without any."""
+        return self._output(self._own, self._own * (1 + self._columns)) if self._columns else None
+
+    def _output(self, first: int, last: int) -> DenseOutput | None:
         if self._times is not None or not self._pieces:
-            return None, None
-        fields = ("start", "length", "side", "series")
-        start, length, side, series = (np.concatenate([getattr(piece, name) for piece in self._pieces]) for name in fields)
-        own, columns = series[:, : self._own], series[:, self._own :]
-        return DenseOutput(start, length, side, own), DenseOutput(start, length, side, columns) if columns.size else None
+            return None
+        if len(self._pieces) > 1:
+            self._pieces = [DenseOutput(*(np.concatenate([getattr(each, name) for each in self._pieces]) for name in FIELDS))]
+        (whole,) = self._pieces
+        if last - first == whole.series.shape[1]:
+            return whole
+        return DenseOutput(whole.start, whole.length, whole.side, whole.series[:, first:last])
 
     def samples(self, end: float, position: np.ndarray, velocity: np.ndarray, side: int) -> Samples | None:
         """The states at the sample times up to the end, for which the given state is used; None if no samples were asked for."""

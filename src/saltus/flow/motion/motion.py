@@ -71,8 +71,6 @@ class Motion(Result):
         The whole forcing periods since time 0.
     events
         All events, in the order of time.
-    impacts
-        The impacts among them, as arrays.
     dense
         The Taylor series of all its steps, in `system.in_gap_coordinates`; None where they were not kept.
     kept
@@ -99,7 +97,6 @@ class Motion(Result):
     chatter_speed: float | None
     periods: int
     events: MotionEvents
-    impacts: Impacts
     dense: DenseOutput | None
     kept: Samples | None
     sampled_validity: Validity | None
@@ -116,6 +113,11 @@ class Motion(Result):
         state = ", ".join(f"{n}={x:.12g}" for n, x in zip(names, np.atleast_1d(self.position), strict=True))
         where = f"{self.stop.value} ({self.limit})" if self.limit else self.stop.value
         return f"Motion(time={self.time:.12g}, {state}, velocity={self.velocity}, impacts={len(self.impacts)}, stop={where})"
+
+    @cached_property
+    def impacts(self) -> Impacts:
+        """The impacts among the events, as arrays."""
+        return self.events.impacts()
 
     @property
     def final_state(self) -> np.ndarray:
@@ -317,14 +319,13 @@ def in_own_coordinates(system: System, motion: Motion) -> Motion:
     if motion.system is system:
         return motion
     position, velocity = system.from_gaps(motion.time, motion.position, motion.velocity)
-    one, events, kept = len(position) == 1, motion.events.in_own_coordinates(system), motion.kept
+    one, kept = len(position) == 1, motion.kept
     return replace(
         motion,
         system=system,
         position=float(position[0]) if one else tuple(position.tolist()),
         velocity=float(velocity[0]) if one else tuple(velocity.tolist()),
-        events=events,
-        impacts=events.impacts(),
+        events=motion.events.in_own_coordinates(system),
         kept=kept and Samples(kept.time, *system.from_gaps(kept.time, kept.position, kept.velocity), kept.side),
     )
 

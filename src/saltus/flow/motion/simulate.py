@@ -58,14 +58,17 @@ def clock(time: Any, length: Any, periods: float | None, duration: float | None)
                 "the load has no frequency, so there are no forcing periods; give duration=... instead", "periods"
             )
         return Clock(0, time, 0, time + span, 0.0)
-    reach = np.max(np.abs(time) / length + (span / length if periods is None else span), initial=0.0)
+    one = isinstance(time, float) and isinstance(length, float)  # without arrays, which take longer
+    divided, reach = divmod if one else np.divmod, abs(time) / length + (span / length if periods is None else span)
+    reach = reach if one else np.max(reach, initial=0.0)
     if not reach < MOST_PERIODS:
         raise ParameterError(f"the motion must start and end within 2^53 forcing periods, got {reach:g} of them", "time")
-    first, local = np.divmod(time, length)
+    first, local = divided(time, length)
     if periods is None:
-        passed, end = np.divmod(local + span, length)
+        passed, end = divided(local + span, length)
     else:
-        passed, end = np.floor(periods), local + (periods - np.floor(periods)) * length
+        passed = math.floor(periods)
+        end = local + (periods - passed) * length
     return Clock(first, local, first + passed, end, length)
 
 
@@ -107,10 +110,10 @@ class MotionRequest:
     def _read(self) -> dict[str, Any]:
         """The fields that follow from the arguments."""
         arguments = (*ARGUMENTS, "times" if self.sensitivities is None else "parameters")
-        position, speeds = np.split(read_start(self.system, self.velocity, self.coordinates, arguments, self.time), 2)
-        for name, value in zip(self.system.model.coordinates, position, strict=True):
-            if self.system.model.unit_of(name) == "rad":
-                notice_degrees(name, value)
+        start = read_start(self.system, self.velocity, self.coordinates, arguments, self.time)
+        position, speeds = start[: start.size // 2], start[start.size // 2 :]
+        for i, name in self.system._remembered("angles", lambda: _angles(self.system)):
+            notice_degrees(name, position[i])
         limits = limits_of(self.system, self.stop_at)
         check_number("tol", self.tol, at_least=1e-15, at_most=1e-6)
         check_number("time", self.time)
@@ -131,11 +134,18 @@ class MotionRequest:
         }
 
 
+def _angles(system: System) -> list[tuple[int, str]]:
+    """The coordinates that are angles, each with its place."""
+    return [(i, name) for i, name in enumerate(system.model.coordinates) if system.model.unit_of(name) == "rad"]
+
+
 def _check_dense(when: Clock, periods: float | None, duration: float | None) -> None:
     """Refuse a motion that is too long to be kept whole."""
     name, span = ("duration", duration) if periods is None else ("periods", periods)
     count = float(span or 0.0) / (1.0 if periods is not None else when.length or 2.0 * math.pi)
-    check_memory(name, count * LIMITS.dense, f"{count:.3g} periods of a motion kept whole (dense=False or times=... keep less)")
+    if count * LIMITS.dense > LIMITS.any_machine:
+        what = f"{count:.3g} periods of a motion kept whole (dense=False or times=... keep less)"
+        check_memory(name, count * LIMITS.dense, what)
 
 
 def _sample_times(given: Any, start: float) -> np.ndarray:
@@ -224,31 +234,44 @@ def simulate(
     return in_own_coordinates(system, follow(request, progress).motion)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Followed:
     """A motion with its tangent at the end."""
 
     motion: Motion
-    columns: np.ndarray  # (2 degrees of freedom, columns): of the coordinates, then of the velocities, at the end
-    shifts: np.ndarray  # (events, columns): the shift of each event
-    tangent: DenseOutput | None  # the columns' coordinates along the motion
+    now: KernelState  # in which it ended
+    recorder: Recorder
+
+    @property
+    def columns(self) -> np.ndarray:
+        """(2 degrees of freedom, columns): of the coordinates, then of the velocities, at the end."""
+        return self.now.columns
+
+    @property
+    def shifts(self) -> np.ndarray:
+        """(events, columns): the shift of each event."""
+        return self.recorder.event_shifts()
+
+    @property
+    def tangent(self) -> DenseOutput | None:
+        """The columns' coordinates along the motion."""
+        return self.recorder.tangent()
 
 
 def follow(request: MotionRequest, progress: Progress, run: Program | None = None) -> Followed:
     """Follow the motion of a request, with its tangent if the request asks for one; `run` is its program, if that is known."""
     run = run or program(request.system, request.limits, request.sensitivities)
-    now = (ContactState if request.system.model.holds_coordinates else KernelState).at_start(request, run)
-    recorder = Recorder(request, int(now.numbers["order"]), int(now.numbers["columns"]))
+    now = (ContactState if run.structure.several else KernelState).at_start(request, run)
+    recorder = Recorder(request, run, int(now.numbers["order"]))
     status = _advance(request.system, run, now, recorder, progress)
-    dense, tangent = recorder.dense()
-    return Followed(_collect(request, now, status, recorder, dense), now.columns, recorder.event_shifts(), tangent)
+    return Followed(_collect(request, now, status, recorder), now, recorder)
 
 
 def _advance(system: System, run: Program, now: KernelState, recorder: Recorder, progress: Progress) -> int:
     """Call the kernel until the motion ends, emptying its buffers in between; returns why it ended."""
     begin, end = now.time, now.end_time
-    many = MOST.burst if system.model.holds_coordinates else MOST.rate
-    checked_at, counted, unit = begin, 0, min(now.numbers["period_length"] or 1.0, 1.0) * many / MOST.rate
+    many = MOST.burst if run.structure.several else MOST.rate
+    checked_at, counted, unit = begin, 0, min(float(now.numbers["period_length"]) or 1.0, 1.0) * many / MOST.rate
     progress(0.0, WHAT)
     while True:
         status = now.advance(run, recorder.steps, recorder.events)
@@ -257,7 +280,8 @@ def _advance(system: System, run: Program, now: KernelState, recorder: Recorder,
         if end > begin:
             progress((time - begin) / (end - begin), WHAT)
         if status not in (Status.FULL, Status.PAUSED):
-            _refuse(system, status, now)
+            if status != Status.DONE:
+                _refuse(system, status, now)
             return status
         if recorder.total > counted + many:
             if time < checked_at + unit:
@@ -328,16 +352,16 @@ def refusal(system: System, status: int, time: str, velocity: str) -> str | None
     return None
 
 
-def _collect(request: MotionRequest, now: KernelState, status: int, recorder: Recorder, dense: DenseOutput | None) -> Motion:
+def _collect(request: MotionRequest, now: KernelState, status: int, recorder: Recorder) -> Motion:
     """The motion from the kernel's last state and its records."""
-    events, time, position, velocity = recorder.all_events(), now.time, now.position, now.velocity
-    mode, one, start = now.numbers["mode"], now.position.size == 1, float(request.time)
-    stop, limit = (Stop.REST if mode == Mode.REST else Stop.HORIZON), None
+    events, time, position, velocity, side = recorder.all_events(), now.time, now.position, now.velocity, now.side
+    numbers, one, start = now.numbers, position.size == 1, float(request.time)
+    stop, limit = (Stop.REST if now.mode == Mode.REST else Stop.HORIZON), None
     if status == Status.LIMITED:
         stop, limit = Stop.LIMIT, request.limits[events.details[-1]]
     if status == Status.STALLED:
         stop, limit = Stop.SINGULAR, request.system.model.singularity  # `_refuse` lets no other motion stall
-    samples = recorder.samples(time, position, velocity, now.side)
+    samples = None if request.sample_times is None else recorder.samples(time, position, velocity, side)
     return Motion(
         system=request.system,
         tol=float(request.tol),
@@ -345,14 +369,13 @@ def _collect(request: MotionRequest, now: KernelState, status: int, recorder: Re
         time=time,
         position=float(position[0]) if one else tuple(position.tolist()),
         velocity=float(velocity[0]) if one else tuple(velocity.tolist()),
-        side=now.side,
+        side=side,
         stop=stop,
         limit=limit,
-        chatter_speed=float(now.numbers["chatter_speed"]) if mode == Mode.CHATTER else None,
-        periods=int(now.numbers["period"]),
+        chatter_speed=float(numbers["chatter_speed"]) if now.mode == Mode.CHATTER else None,
+        periods=int(numbers["period"]),
         events=events,
-        impacts=events.impacts(),
-        dense=dense,
+        dense=recorder.dense(),
         kept=samples,
         sampled_validity=None if samples is None else recorder.validity(time - start),
     )

@@ -1,0 +1,116 @@
+"""A call of `simulate` does what depends on its start alone: what follows from the system is kept with it.
+
+Work is counted in calls of functions, which are the same on every machine.
+"""
+
+import pickle
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from shared_systems import forced
+
+from saltus import Harmonic, Load, Model, NewtonImpact, System, TwoLayer, simulate
+
+LAYERS = System(
+    model=TwoLayer(beta0=1.4, damping=0.1, mass_ratio=0.2),
+    load=Load(frequency=1.0, vertical=-0.5, horizontal=Harmonic(amplitude=0.4)),
+    impact=NewtonImpact(e=0.5),
+)
+CASES = {"one contact": (forced(), {"theta": 0.3}, 130), "two layers": (LAYERS, {"theta_1": 0.1, "theta_2": -0.05}, 220)}
+stiffness = 1.0
+
+
+def calls(function):
+    """The functions of Python that are called, by their names."""
+    names = []
+    sys.setprofile(lambda frame, event, _: names.append(frame.f_code.co_qualname) if event == "call" else None)
+    try:
+        function()
+    finally:
+        sys.setprofile(None)
+    return names
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_second_motion_of_a_system_checks_and_traces_nothing_of_it(name):
+    system, start, most = CASES[name]
+    simulate(system, periods=1, **start)
+    again = calls(lambda: simulate(system, periods=1, **start))
+    assert not {"trace", "children", "numbers", "record_table", "Structure.prepare", "_check_class", "energy_gain"} & {*again}
+    assert len(again) < most
+
+
+def test_impacts_and_margins_are_made_when_they_are_read():
+    motion = simulate(forced(), theta=0.3, periods=5)
+    assert not {"impacts", "validity"} & vars(motion).keys()
+    assert len(motion.impacts) == sum(event.kind == "impact" for event in motion.events) > 0
+    assert motion.impacts is motion.impacts
+
+
+def test_what_is_kept_with_a_system_is_no_part_of_it():
+    system = forced()
+    before = pickle.dumps(system)
+    simulate(system, theta=0.3, periods=1)
+    assert pickle.dumps(system) == before
+    assert system == pickle.loads(before)
+    twin = system.with_({"load.horizontal.amplitude": 0.7})
+    one, other = (
+        simulate(s, theta=0.3, periods=3).final_state for s in (twin, forced().with_({"load.horizontal.amplitude": 0.7}))
+    )
+    assert np.array_equal(one, other)
+    assert not np.array_equal(one, simulate(system, theta=0.3, periods=3).final_state)
+
+
+def test_threads_share_a_system_and_not_what_the_kernel_writes():
+    starts = [{"theta_1": 0.1 + 0.01 * i, "theta_2": -0.05} for i in range(8)]
+    alone = [simulate(LAYERS, periods=20, **start).final_state for start in starts]
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(lambda start: simulate(LAYERS, periods=20, **start).final_state, starts))
+    assert np.array_equal(alone, together)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Global(Model):
+    """x'' = - stiffness x, with the number of this module."""
+
+    damping: float = 0.0
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+
+    def acceleration(self, t, x, velocity, side, load):
+        return -stiffness * x - self.damping * velocity
+
+
+@dataclass(kw_only=True)
+class Changeable(Model):
+    """x'' = - stiffness x, whose number can be changed."""
+
+    stiffness: float = 1.0
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+
+    def acceleration(self, t, x, velocity, side, load):
+        return -self.stiffness * x
+
+
+def test_a_number_that_a_model_reads_from_its_module_is_read_at_every_call(monkeypatch):
+    system = System(model=Global())
+    assert simulate(system, x=1.0, duration=1.0).x == pytest.approx(np.cos(1.0), abs=1e-12)
+    monkeypatch.setattr(sys.modules[__name__], "stiffness", 4.0)
+    assert simulate(system, x=1.0, duration=1.0).x == pytest.approx(np.cos(2.0), abs=1e-12)
+
+
+def test_nothing_is_kept_of_a_system_that_can_change():
+    system = System(model=Changeable())
+    assert simulate(system, x=1.0, duration=1.0).x == pytest.approx(np.cos(1.0), abs=1e-12)
+    system.model.stiffness = 4.0
+    assert simulate(system, x=1.0, duration=1.0).x == pytest.approx(np.cos(2.0), abs=1e-12)
+
+
+def test_further_changes_of_the_load_alone_check_no_model_again():
+    LAYERS.with_({"load.horizontal.amplitude": 0.2})
+    made = calls(lambda: LAYERS.with_({"load.horizontal.amplitude": 0.3}))
+    assert "check_contact_model" not in made
+    assert "check_contact_model" in calls(lambda: LAYERS.with_({"model.mass_ratio": 0.3}))
