@@ -208,6 +208,12 @@ def test_a_click_on_a_branch_shows_its_orbit_and_arrow_keys_step_along(page):
     assert "damping = 0.1" in page.evaluate("document.querySelector('#differing').textContent")
 
 
+def test_the_marks_of_special_points_are_explained(page):
+    items = "[...document.querySelectorAll('#special-legend li')].map((item) => item.textContent)"
+    assert page.evaluate(items) == ["fold (LP), 1"]
+    assert page.evaluate("document.querySelector('#special-legend polygon').points.length") == 24
+
+
 def test_a_result_of_another_system_is_not_shown(page):
     assert page.evaluate("document.querySelector('#results-refused').textContent") == (
         "Other is a result of another system and is not shown."

@@ -23,10 +23,17 @@ from saltus.systems import System, numbers
 MEANINGS = {
     "LP": "fold",
     "PD": "period doubling",
-    "BPC": "symmetry breaking",
+    "BPC": "branch point",
+    "NS": "Neimark–Sacker",
     "GR": "grazing",
-    "SW": "an impact appears or is lost",
-}  # of the kinds of special points that have a name in words
+    "SW": "switching",
+    "RL": "release",
+    "CH": "end of a rest",
+    "GS": "grazing-sliding",
+    "CS": "crossing-sliding",
+    "SS": "switching-sliding",
+    "AS": "adding-sliding",
+}  # of the kinds of special points
 
 
 def digest(system: System) -> str:

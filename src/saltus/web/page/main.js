@@ -14,7 +14,7 @@ import { asCsv, asPng, asPython, asSvg, asToml, save } from "./exports.js";
 import { Sweep } from "./sweep.js";
 import { BASIN_GRID, Basins } from "./basins.js";
 import { basinsLegend, basinsView, sweepControls, sweepSaid, sweepView } from "./laboratory.js";
-import { Choice, differingSaid, ofThisSystem, orbitSaid, paintBeneath, resultView } from "./results_view.js";
+import { Choice, differingSaid, ofThisSystem, orbitSaid, paintBeneath, resultView, specialLegend } from "./results_view.js";
 import { currentPalette, forgetPalette } from "./palette.js";
 import { entriesOf, firstState, goesOn, isPeriodic, spaced, startEntries, tamed } from "./description.js";
 import { Embedding } from "./embedding.js";
@@ -258,6 +258,7 @@ export class Page {
     choice.addEventListener("change", () => {
       this.shownResult = Number(choice.value);
       store.set({ selected: null, windows: { ...store.state.windows, result: null } });
+      this.saySelected();
       this.drawAll();
     });
     this.addPlot(resultView(this.session, () => this.results[this.shownResult] ?? null, this.choice));
@@ -288,6 +289,7 @@ export class Page {
     const { selected } = this.store.state;
     const result = selected && this.results[selected.result];
     const shown = this.results[this.shownResult];
+    specialLegend(at("special-legend"), shown);
     at("differing").textContent = shown ? differingSaid(shown, this.store.state.values) : "";
     at("orbit").textContent = selected && result ? orbitSaid(result, selected.branch, selected.point) : "";
   }

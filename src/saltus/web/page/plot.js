@@ -207,6 +207,18 @@ export function wideEnough(window_) {
   return x1 - x0 > narrowest(x0, x1) && y1 - y0 > narrowest(y0, y1);
 }
 
+/** The shapes of the kinds of special points, as in the figures of Python: how many corners, the direction of the first in quarter turns, and how far the corners between lie from the middle. @type {Record<string, [number, number, number]>} */
+const SHAPES = {
+  LP: [24, 0, 1], PD: [4, 0.5, 1], BPC: [4, 0, 1], NS: [5, -1, 0.45], GR: [3, -1, 1], SW: [3, 1, 1], GS: [3, 2, 1], SS: [3, 0, 1], CS: [4, 0.5, 0.4], AS: [4, 0, 0.4], RL: [6, 0, 1], CH: [6, 1, 0.5],
+};
+
+/** The corners of a kind's shape about (0, 0), of the radius 1. @param {string} kind @returns {[number, number][]} */
+export function cornersOf(kind) {
+  const [count, turn, between] = SHAPES[kind] ?? [8, 0.5, 1];
+  const at = (/** @type {number} */ share, /** @type {number} */ r) => /** @type {[number, number]} */ ([r * Math.cos(Math.PI * (turn / 2 + 2 * share)), r * Math.sin(Math.PI * (turn / 2 + 2 * share))]);
+  return Array.from({ length: count }, (_, i) => (between < 1 ? [at(i / count, 1), at((i + 0.5) / count, between)] : [at(i / count, 1)])).flat();
+}
+
 /** Draws in the coordinates of a window, on a canvas or as SVG. */
 export class Painter {
   /**
@@ -359,6 +371,19 @@ export class Painter {
   mark(x, y, color, radius = 5) {
     this.dots([x], [y], this.palette.paper, radius + 1.5);
     this.dots([x], [y], color, radius);
+  }
+
+  /** A special point: the shape of its kind, with a rim of the paper's colour. @param {number} x @param {number} y @param {string} kind @param {number} radius */
+  special(x, y, kind, radius = 4) {
+    const [left, top] = [this.x(x), this.y(y)];
+    if (!Number.isFinite(left + top) || Math.abs(left) > 1e5 || Math.abs(top) > 1e5) return;
+    for (const [color, size] of /** @type {[string, number][]} */ ([[this.palette.paper, radius + 1.6], [this.palette.ink, radius]])) {
+      this.ctx.fillStyle = color;
+      this.ctx.beginPath();
+      cornersOf(kind).forEach(([dx, dy], i) => (i ? this.ctx.lineTo(left + size * dx, top + size * dy) : this.ctx.moveTo(left + size * dx, top + size * dy)));
+      this.ctx.closePath();
+      this.ctx.fill();
+    }
   }
 
   /** An open circle. @param {number} x @param {number} y @param {string} color @param {number} radius */

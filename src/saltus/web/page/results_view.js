@@ -3,6 +3,7 @@
 import { allDigits, clamp, rangeOf, shortly } from "./numbers.js";
 import { parameterName, parameterSymbol } from "./symbols.js";
 import { branchLine } from "./palette.js";
+import { cornersOf } from "./plot.js";
 
 /** @typedef {import("./types.js").ResultEntry} ResultEntry */
 /** @typedef {import("./types.js").ResultBranch} ResultBranch */
@@ -100,9 +101,25 @@ function paintDiagram(painter, result) {
       painter.curve(branch.parameter.slice(from, to + 1), branch.amplitude.slice(from, to + 1), { ...branchLine(palette, Boolean(branch.stable[from])), alpha: painter.fade ? 0.35 : 1 });
     }
   }
-  for (const { kind, parameter, amplitude } of result.special ?? []) {
-    painter.mark(parameter, amplitude, kind === "LP" ? palette.ink : palette.limit, 3);
-  }
+  for (const { kind, parameter, amplitude } of result.special ?? []) painter.special(parameter, amplitude, kind);
+}
+
+/** What the marks of a diagram mean, and how many there are. @param {HTMLElement} host @param {ResultEntry|null|undefined} result */
+export function specialLegend(host, result) {
+  const special = result?.special ?? [];
+  const kinds = [...new Set(special.map(({ kind }) => kind))];
+  host.replaceChildren(...kinds.map((kind) => {
+    const item = document.createElement("li");
+    const shape = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+    const outline = document.createElementNS("http://www.w3.org/2000/svg", "polygon");
+    shape.setAttribute("viewBox", "-1 -1 2 2");
+    shape.setAttribute("aria-hidden", "true");
+    outline.setAttribute("points", cornersOf(kind).map((corner) => corner.join(",")).join(" "));
+    shape.append(outline);
+    const of = special.filter((each) => each.kind === kind);
+    item.append(shape, `${of[0]?.text} (${kind}), ${of.length}`);
+    return item;
+  }));
 }
 
 /** Stretches of a branch of one stability; each reaches to the first point of the next. @param {number[]} stable */
