@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
+from operator import attrgetter
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, get_type_hints
@@ -103,13 +104,13 @@ def _read_side(value: Any) -> int:
 
 
 QUESTIONS: dict[str, tuple[str, ...]] = {
-    "phase_portrait": ("studies:phase_portrait",),
-    "response_spectrum": ("studies:response_spectrum", "studies:bifurcation_diagram"),
-    "bifurcation_diagram": ("studies:bifurcation_diagram",),
-    "frequency_sweep": ("studies:frequency_sweep",),
-    "attractors": ("attractors:find_attractors",),
-    "basins": ("attractors:basins_of_attraction",),
-    "stability_chart": ("studies:stability_chart", "studies:bordered_chart"),
+    "phase_portrait": ("phase_portrait",),
+    "response_spectrum": ("response_spectrum", "bifurcation_diagram"),
+    "bifurcation_diagram": ("bifurcation_diagram",),
+    "frequency_sweep": ("frequency_sweep",),
+    "attractors": ("find_attractors",),
+    "basins": ("basins_of_attraction",),
+    "stability_chart": ("stability_chart", "studies.bordered_chart"),
 }  # The first function that takes all the given keys answers; a function with open-ended options passes them to the other.
 NOT_IN_FILES = ("system", "store", "workers", "scheduler")  # these come from the rest of the file or the command line
 
@@ -133,8 +134,7 @@ class Ask:
 
 def functions_of(kind: str) -> list[Callable[..., Any]]:
     """The functions in the table of questions."""
-    places = [place.split(":") for place in QUESTIONS[kind]]
-    return [getattr(import_module(f"saltus.{room}"), name) for room, name in places]
+    return [attrgetter(name)(import_module("saltus")) for name in QUESTIONS[kind]]
 
 
 def keys_of(kind: str, coordinates: tuple[str, ...] = ()) -> dict[str, Reader]:

@@ -193,9 +193,10 @@ export function frameOf(width, height) {
   return { left, top, width: Math.max(width - left - right, 10), height: Math.max(height - top - bottom, 10) };
 }
 
-/** @param {number} low @param {number} high @param {Axis} axis @returns {[number, number]} */
+/** What is seen of a range; numbers that differ by rounding alone are one number. @param {number} low @param {number} high @param {Axis} axis @returns {[number, number]} */
 function widened(low, high, axis) {
-  const room = high > low ? 0.05 * (high - low) : Math.max(Math.abs(low) * 0.1, 0.5);
+  const rounding = 1e-12 * Math.max(Math.abs(low), Math.abs(high));
+  const room = high - low > rounding ? 0.05 * (high - low) : Math.max(Math.abs(low) * 0.1, 0.5);
   return [axis.low ?? low - room, axis.high ?? high + room];
 }
 
