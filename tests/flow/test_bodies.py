@@ -9,6 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import saltus
 from saltus import Contact, Friction, ImpactPair, NewtonImpact
@@ -287,6 +288,63 @@ def test_a_bounce_of_period_one_is_born_and_doubled_where_its_closed_form_says(e
     branch = saltus.continue_orbit(orbit, "load.ground.amplitude", (0.9 * born, 1.1 * doubled))
     places = {str(point.kind): point.parameter for point in branch.special if point.kind in ("LP", "PD")}
     assert places == {"LP": pytest.approx(born, abs=1e-10), "PD": pytest.approx(doubled, abs=1e-10)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Duffing(ContactModel):
+    """Two masses on springs that harden; the first one hits a wall, and the second one hits the first."""
+
+    cubic: float = 0.8
+    mass: float = 0.5
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x", "y")
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+    contacts: ClassVar[tuple[Contact, ...]] = (
+        Contact(name="wall", coordinate="x", sign=-1, position=0.7),
+        Contact(name="between", coordinate={"y": 1.0, "x": -1.0}, position=-0.4),
+    )
+
+    def mass_matrix(self, q):
+        return [[1.0, 0.0], [0.0, self.mass]]
+
+    def force(self, t, q, v, load):
+        pull = 0.6 * (q[1] - q[0]) + self.cubic * (q[1] - q[0]) ** 3
+        return load.force(t) - 0.05 * v[0] - q[0] - self.cubic * q[0] ** 3 + pull, -pull - 0.05 * v[1]
+
+
+def duffing_by_dop853(state, end, e=0.8):
+    """The state at the end, and times and gaps of the impacts, by SciPy's DOP853 from one event to the next."""
+    t, state, met = 0.0, np.array(state), []
+
+    def rates(t, z):
+        x, y, u, v = z
+        pull = 0.6 * (y - x) + 0.8 * (y - x) ** 3
+        return [u, v, 0.9 * math.sin(1.2 * t) - 0.05 * u - x - 0.8 * x**3 + pull, (-pull - 0.05 * v) / 0.5]
+
+    gaps = [lambda t, z: 0.7 - z[0], lambda t, z: z[1] - z[0] + 0.4]
+    for gap in gaps:
+        gap.terminal, gap.direction = True, -1.0
+    while t < end:
+        found = solve_ivp(rates, (t, end), state, "DOP853", rtol=3e-14, atol=1e-15, events=gaps)
+        t, state = found.t[-1], found.y[:, -1].copy()
+        for i in range(2 if found.status == 1 else 0):
+            if found.t_events[i].size:
+                met.append((t, i))
+                rate = -state[2] if i == 0 else state[3] - state[2]
+                impulse = -(1.0 + e) * rate / (1.0 if i == 0 else 1.0 + 1.0 / 0.5)
+                state[2:] += [-impulse, 0.0 if i == 0 else impulse / 0.5]
+    return state, met
+
+
+def test_two_duffing_oscillators_that_hit_each_other_and_a_wall_move_as_dop853_with_events_says():
+    system = System(model=Duffing(), load=Load(frequency=1.2, force=Harmonic(0.9)), impact=NewtonImpact(e=0.8))
+    motion = simulate(system, x=0.1, y=0.3, velocity=(0.5, -0.4), duration=20.0)
+    state, met = duffing_by_dop853([0.1, 0.3, 0.5, -0.4], 20.0)
+    assert [event.contact for event in motion.events] == [("wall", "between")[i] for _, i in met]
+    assert {i for _, i in met} == {0, 1}
+    assert len(met) >= 10
+    np.testing.assert_allclose(motion.events.times, [time for time, _ in met], rtol=0, atol=1e-11)
+    np.testing.assert_allclose(motion.final_state, state, rtol=0, atol=1e-11)
 
 
 # --- all at once: coefficients that are no whole numbers, a table that shakes, and a mass that hits both -----------------------

@@ -191,8 +191,18 @@ def test_a_start_at_rest_on_a_surface_follows_the_field_or_is_refused():
     surfaces = (Surface(name="middle", coordinate="x"),)
     motion = simulate(System(model=model_of(away, surfaces)), x=0.0, duration=1.0)
     assert (motion.x, motion.sides) == (pytest.approx(-1.5, abs=1e-14), {"middle": -1})
-    with pytest.raises(saltus.MotionError, match="no choice"):
+    with pytest.raises(saltus.MotionError, match="push a start on it back to it"):
         simulate(WELL, x=0.0, duration=1.0)
+
+
+def test_a_start_at_rest_on_a_surface_from_which_both_sides_lead_away_is_refused():
+    """x'' = s goes to +inf or to -inf from there; beside it, and with a speed, it is unique."""
+    system = System(model=model_of(lambda self, t, x, v, load, sides: sides.ridge, (Surface(name="ridge", coordinate="x"),)))
+    with pytest.raises(saltus.MotionError, match="both lead away from it, so that it is not unique; start beside it"):
+        simulate(system, x=0.0, duration=1.0)
+    assert simulate(system, x=1e-12, duration=2.0).x == pytest.approx(2.0, abs=1e-11)
+    assert simulate(system, x=-1e-12, duration=2.0).x == pytest.approx(-2.0, abs=1e-11)
+    assert simulate(system, x=0.0, velocity=-0.5, duration=2.0).x == pytest.approx(-3.0, abs=1e-14)
 
 
 def test_a_motion_that_only_touches_a_surface_stays_on_its_side():
@@ -235,7 +245,7 @@ def test_surfaces_without_meaning_are_refused_when_the_system_is_made():
     with pytest.raises(saltus.ParameterError, match="no surface 'b'"):
         System(model=model_of(reads, (side,)))
     for wrong, sentence in (
-        (Surface(name="a", coordinate="z"), "the surface 'a' holds 'z', but Made has x"),
+        (Surface(name="a", coordinate="z"), "the surface 'a' is of 'z', but Made has x"),
         (Surface(name="a", coordinate={"x": 0.0}), "coefficients that are numbers other than 0"),
     ):
         with pytest.raises(saltus.ParameterError, match=sentence):

@@ -167,8 +167,8 @@ def check_contact_model(model: ContactModel) -> bool:
         )
     for contact in parts:
         if isinstance(contact.coordinate, str) and contact.coordinate not in model.coordinates:
-            known, what = ", ".join(model.coordinates), type(contact).__name__.lower()
-            raise ParameterError(f"the {what} {contact.name!r} holds {contact.coordinate!r}, but {kind} has {known}", "model")
+            known, what = ", ".join(model.coordinates), _named(contact)
+            raise ParameterError(f"{what} {contact.coordinate!r}, but {kind} has {known}", "model")
         if not isinstance(contact.coordinate, str):
             _check_sum(model, contact)
     for a in contacts:
@@ -240,7 +240,7 @@ def _check_sum(model: ContactModel, contact: Contact | Surface) -> None:
     names, given = model.coordinates, contact.coordinate
     if not isinstance(given, Mapping) or not given:
         raise ParameterError(
-            f"{where} must hold a coordinate, or a dictionary such as {{'y': 1.0, 'x': -1.0}}, got {shown(given)}", "model"
+            f"{where} must be given a coordinate, or a dictionary such as {{'y': 1.0, 'x': -1.0}}, got {shown(given)}", "model"
         )
     grounds = [channel for channel in model.channels if channel.startswith("ground")]
     for name, factor in given.items():
@@ -248,18 +248,23 @@ def _check_sum(model: ContactModel, contact: Contact | Surface) -> None:
             known = ", ".join((*names, *grounds))
             reason = " (a wall moves with a channel whose name begins with ground, as those are displacements)"
             raise ParameterError(
-                f"{where} holds {shown(name)}, none of {known}{reason if name in model.channels else ''}", "model"
+                f"{_named(contact)} {shown(name)}, none of {known}{reason if name in model.channels else ''}", "model"
             )
         if not (isinstance(factor, (int, float)) and math.isfinite(factor) and factor != 0.0):
             raise ParameterError(
                 f"{where} must have coefficients that are numbers other than 0, got {shown(factor)} of {name}", "model"
             )
     if not any(name in names for name in given):
-        raise ParameterError(f"{where} holds {', '.join(given)} and no coordinate of {', '.join(names)}", "model")
+        raise ParameterError(f"{_named(contact)} {', '.join(given)} and no coordinate of {', '.join(names)}", "model")
     if type(model).acceleration is not ContactModel.acceleration:
         raise ParameterError(
-            f"{where} holds a sum of coordinates, so {type(model).__name__} must define force, not acceleration", "model"
+            f"{_named(contact)} a sum of coordinates, so {type(model).__name__} must define force, not acceleration", "model"
         )
+
+
+def _named(part: Contact | Surface) -> str:
+    """What a part is called, with the verb for what it does to its coordinate: a motion passes a surface."""
+    return f"the contact {part.name!r} holds" if isinstance(part, Contact) else f"the surface {part.name!r} is of"
 
 
 def _check_moving_walls(model: InGapCoordinates) -> None:

@@ -42,7 +42,8 @@ def hold_frictions(motion):
 
 @lean_jit
 def begin_on_surfaces(motion, t):
-    """Choose the sides of surfaces on which a motion starts: those to which it moves on; False if there is none."""
+    """Choose the sides of surfaces on which a motion starts: those to which it moves on; False if there is none, or if both sides
+    of one lead away from it."""
     for _ in range(2):
         hold_frictions(motion)
         agrees = True
@@ -58,8 +59,26 @@ def begin_on_surfaces(motion, t):
                 row[FrictionColumn.SLIDES] *= -1
                 agrees = False
         if agrees:
-            return True
+            return leads_one_way(motion, t)
     return False
+
+
+@lean_jit
+def leads_one_way(motion, t):
+    """Whether a motion that starts at rest on surfaces would move on to none but the sides that were chosen."""
+    one_way = True
+    for k in range(motion.frictions.shape[0]):
+        row = motion.frictions[k]
+        if row[FrictionColumn.MARGIN] == NoMargin.SURFACE and 1 < row[FrictionColumn.SKIP] < motion.order:
+            row[FrictionColumn.SLIDES] *= -1
+            hold_frictions(motion)
+            expand(motion, t, 1.0, motion.order)
+            sliding_series(motion, k, 1.0 * row[FrictionColumn.SLIDES], motion.order, motion.gap_series)
+            i = leading(motion.gap_series, 0, motion.order)
+            one_way = one_way and not (i < motion.order and motion.gap_series[i] > 0.0)
+            row[FrictionColumn.SLIDES] *= -1
+    hold_frictions(motion)
+    return one_way
 
 
 @lean_jit

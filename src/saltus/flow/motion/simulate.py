@@ -328,6 +328,12 @@ def refusal(system: System, status: int, time: str, velocity: str) -> str | None
     at = f"at time {time}"
     if status in (Status.NOT_UNIQUE, Status.NO_IMPACT) and system.model.holds_coordinates:
         choice = "no choice of closed contacts, and of what sticks, is consistent"
+        if status == Status.NOT_UNIQUE and system.model.surfaces:
+            names = " or ".join(repr(surface.name) for surface in system.model.surfaces)
+            return (
+                f"{choice} {at}: both sides of a surface, {names}, push a start on it back to it, or both lead away from it, so "
+                "that it is not unique; start beside it"
+            )
         what = choice if status == Status.NOT_UNIQUE else "the impact law has no solution"
         return f"{what} {at}: the mass matrix is not positive definite there, or all but singular"
     if status == Status.NOT_UNIQUE:
