@@ -17,7 +17,7 @@ from saltus.notebook import html_table
 from saltus.orbits.equations.contract import OrbitEquations, OrbitEvaluation, Solution
 from saltus.orbits.signature import TOLERANCES, Signature
 from saltus.result import Result
-from saltus.systems import System, arguments_of, state_of
+from saltus.systems import System, arguments_of, state_of, with_rates
 
 if TYPE_CHECKING:
     import xarray
@@ -272,8 +272,10 @@ class PeriodicOrbit(Result):
 
     @cached_property
     def multipliers(self) -> np.ndarray:
-        """The Floquet multipliers, by falling modulus, complex (2 degrees of freedom,)."""
+        """The Floquet multipliers, by falling modulus, complex (2 degrees of freedom,); one for each coordinate of first order."""
         chain = self.solution.evaluation.monodromy()
+        if self.equations.following.size and len(chain) == self.system.dimension:
+            chain = np.delete(np.delete(chain, self.equations.following, axis=0), self.equations.following, axis=1)
         if not np.isfinite(chain).all():
             return np.full(len(chain), complex(np.inf))
         values = np.linalg.eigvals(chain).astype(complex)
@@ -358,16 +360,16 @@ class PeriodicOrbit(Result):
         """
         check_count("rounds", rounds, 1, LIMITS.periods // self.period)
         start, motion = self.start(), self.motion(rounds * self.period)
-        apart = np.subtract(motion.position, [start[name] for name in self.system.model.coordinates])
-        return float(np.abs(np.append(apart, np.subtract(motion.velocity, start["velocity"]))).max())
+        apart = np.subtract(motion.final_state, state_of(self.system, start))
+        return float(np.abs(np.delete(apart, self.equations.following)).max())
 
     @cached_property
     def state(self) -> tuple[Any, Any]:
         """Coordinate and velocity at phase 0 of the load, the stroboscopic section."""
         start = self.start()
         if not start.get("time", 0.0):
-            position = [start[name] for name in self.system.model.coordinates]
-            return (*position, start["velocity"]) if len(position) == 1 else (np.array(position), np.array(start["velocity"]))
+            position, velocity = np.split(with_rates(self.system, 0.0, state_of(self.system, start)), 2)
+            return (float(position[0]), float(velocity[0])) if len(position) == 1 else (position, velocity)
         period = 2.0 * math.pi / self.frequency
         ahead = max(1, math.ceil(start["time"] / period)) * period - start["time"]
         motion = simulate(self.system, **start, duration=ahead, tol=1e-13, dense=False)

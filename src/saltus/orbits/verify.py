@@ -83,23 +83,24 @@ def closing_rows(orbits: list[PeriodicOrbit], rounds: int = 1) -> np.ndarray:
 
 def closing_distances(system: System, path: str | None, rows: np.ndarray, tol: float = 1e-13) -> np.ndarray:
     """The distance of each orbit's state from itself at the end of its motion, from rows that `closing_rows` gives, (n,)."""
-    names, count = system.model.coordinates, len(system.model.coordinates)
+    names, moving = system.model.coordinates, system.model.moving
+    count = len(names)
     result = np.full(len(rows), np.inf)
     for periods in np.unique(rows[:, -1]):
         places = rows[:, -1] == periods
         *columns, times, speeds, _ = rows[places].T
         varied, states = ({path: columns[0]}, columns[1:]) if path is not None else ({}, columns)
         begin, velocities = dict(zip(names, states, strict=False)), states[count:]
-        velocity: Any = velocities[0] if count == 1 else tuple(velocities)
+        velocity: Any = velocities[0] if len(moving) == 1 else tuple(velocities[: len(moving)]) or 0.0
         ends = simulate_many(
             system, **begin, velocity=velocity, time=times, parameters=varied, periods=int(periods), sample=(), tol=tol
         )
         apart = np.max([np.abs(ends[name].values - begin[name]) for name in names], axis=0)
-        if count == 1:
+        if moving == names and count == 1:
             after, before = ends["velocity"].values, np.where(speeds < 0.0, np.inf, speeds)
             either = np.minimum(np.abs(after - velocity), np.abs(np.abs(after) - before))
         else:
-            after = np.stack([ends[f"{name}_velocity"].values for name in names])
-            either = np.abs(after - np.array(velocities)).max(axis=0)
+            speeds_after = [ends[f"{name}_velocity"].values for name in moving]
+            either = np.max([np.abs(a - b) for a, b in zip(speeds_after, velocities, strict=False)] or [0.0 * apart], axis=0)
         result[places] = np.maximum(apart, either)
     return result

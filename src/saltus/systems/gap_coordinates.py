@@ -150,6 +150,10 @@ class InGapCoordinates(ContactModel):
         """Those of the model as it was given."""
         return super().normal_forces(t, self.own(t, theta, load), self.own(t, velocity, load, 1), load)
 
+    def after_impact(self, contact: str, theta: Any, velocity: Any) -> Any:
+        """That of the model as it was given; none is asked for one where a wall moves."""
+        return super().after_impact(contact, self.own(0.0, theta, None), self.own(0.0, velocity, None, 1))
+
     def kinetic_energy(self, t: Any, theta: Any, velocity: Any, side: Any, load: Any) -> Any:
         """That of the model as it was given."""
         return super().kinetic_energy(t, self.own(t, theta, load), self.own(t, velocity, load, 1), side, load)

@@ -32,7 +32,8 @@ class Model:
     """A smooth oscillator, and what all models share. Subclass it as a frozen, keyword-only dataclass of numbers and give it:
 
     1. `coordinates`, the names of its degrees of freedom, their `units` ("1" where it gives none), and `channels`, the load
-       channels that it reads;
+       channels that it reads; in `first_order` those of the coordinates, the last ones, whose rates follow from the state, as
+       those of a voltage or a temperature: what the model returns for such a coordinate is its rate in place of an acceleration;
     2. `acceleration`, an expression of numbers, NumPy functions, load channels and `abs` of the coordinate. It is traced
        once with symbols into a Taylor recurrence, so it may not branch on the state;
     3. optionally `mirror` (the symmetry that maps motions to motions), `kinetic_energy` (for impact laws that need
@@ -62,6 +63,7 @@ class Model:
     __slots__ = ()
 
     coordinates: ClassVar[tuple[str, ...]] = ("theta",)
+    first_order: ClassVar[tuple[str, ...]] = ()
     units: ClassVar[tuple[str, ...]] = ()
     channels: ClassVar[tuple[str, ...]] = ()
     margin_kinds: ClassVar[Mapping[str, MarginKind]] = {}
@@ -143,7 +145,12 @@ class Model:
     @property
     def has_state_plane(self) -> bool:
         """Whether its state is a point of a plane on which areas change smoothly: one coordinate, which nothing holds."""
-        return len(self.coordinates) == 1 and not self.holds_coordinates
+        return len(self.coordinates) == 1 and not self.holds_coordinates and not self.first_order
+
+    @property
+    def moving(self) -> tuple[str, ...]:
+        """Its coordinates that have velocities of their own: all but those of first order."""
+        return self.coordinates[: len(self.coordinates) - len(self.first_order)]
 
     def reaches(self, coordinate: str, values: Any) -> Any:
         """Whether a coordinate can have these values, an array of their shape: a contact keeps it from others.

@@ -12,7 +12,15 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import ParameterError, SaltusError, shown
-from saltus.systems.contact_model import MOST_CONTACTS, MOST_FRICTIONS, Contact, ContactModel, Surface, sides_for
+from saltus.systems.contact_model import (
+    MOST_CONTACTS,
+    MOST_FRICTIONS,
+    Contact,
+    ContactModel,
+    Surface,
+    jumps_of_first_order,
+    sides_for,
+)
 from saltus.systems.gap_coordinates import InGapCoordinates
 from saltus.systems.impact_laws import ImpactLaw
 from saltus.systems.load import DeclaredLoad, Load
@@ -21,7 +29,7 @@ from saltus.systems.model import Model, OneContactModel, check_one_contact
 # The parts of the contracts of the two siblings: a class that defines one of them and is of neither has the wrong base.
 OWN_PARTS = {
     OneContactModel: ("sides", "gap", "reset", "inelastic_factor"),
-    ContactModel: ("contacts", "frictions", "surfaces", "force", "mass_matrix", "normal_forces", "transfers"),
+    ContactModel: ("contacts", "frictions", "surfaces", "force", "mass_matrix", "normal_forces", "transfers", "after_impact"),
 }
 # What may be rounding in a gap at the contact, relative to its rate, and in entries of a mass matrix; a mistake is larger.
 MODEL_ROUNDING = 1e-9
@@ -41,6 +49,7 @@ def check_works(model: Model) -> bool:
     sums = False
     if type(model) not in _known:
         _check_class(type(model))
+    _check_first_order(model)
     if isinstance(model, OneContactModel):
         check_one_contact(model)
     if isinstance(model, ContactModel):
@@ -107,6 +116,64 @@ def _check_arguments(kind: type[Model], name: str, function: FunctionType) -> No
         inspect.signature(getattr(kind, name)).bind(*wanted)
     except TypeError:
         raise ParameterError(f"{kind.__name__}.{name} must take the arguments {', '.join(wanted)}", "model") from None
+
+
+def _check_first_order(model: Model) -> None:
+    """Refuse coordinates of first order that are not the last ones, and those of which a part of the model needs the velocity."""
+    kind, names, given = type(model).__name__, model.coordinates, model.first_order
+    if isinstance(given, str) or given != names[len(names) - len(given) :]:
+        raise ParameterError(
+            f"{kind}.first_order must be a tuple of the last of the coordinates {', '.join(names)}, such as ({names[-1]!r},), got "
+            f"{shown(given)}",
+            "model",
+        )
+    if given and model.sides:
+        raise ParameterError(f"{names[0]} of {kind} is of first order, so it has no velocity with which to hit a contact", "model")
+    jumps = isinstance(model, ContactModel) and model.jumps
+    if jumps and not (given and model.contacts):
+        what = "no contact" if given else "no coordinate of first order, such as first_order = ('voltage',)"
+        raise ParameterError(f"{kind} defines after_impact and has {what}: leave it out", "model")
+    for part in (*model.contacts, *model.frictions, *model.surfaces):
+        terms = [part.coordinate] if isinstance(part.coordinate, str) else list(part.coordinate)
+        held = [name for name in terms if name in given]
+        if held and not (isinstance(part, Surface) and len(terms) == 1):
+            what = type(part).__name__.lower()
+            raise ParameterError(
+                f"the {what} {part.name!r} of {kind} holds {held[0]}, which is of first order and has no velocity that could stop; "
+                "a surface may have one such coordinate alone",
+                "model",
+            )
+    if jumps and isinstance(model, InGapCoordinates) and any(model.sums()[1]):
+        raise ParameterError(f"{kind} has a wall that moves, at which after_impact is not told its velocity: leave it out", "model")
+
+
+def _check_rates(model: Model) -> None:
+    """Refuse functions that read the velocity of a coordinate of first order, which is to follow from the state."""
+    size, moving, (t, q, v), load = len(model.coordinates), len(model.moving), PROBE, DeclaredLoad(Load(frequency=1.0), model)
+
+    def is_known(method: str, unknown: float) -> bool:
+        state = [(q,) * size, (v,) * moving + (unknown,) * (size - moving)]
+        place, speed = (x[0] if size == 1 else x for x in state)
+        rest = {"force": (load, *sides_for(model, t, place, load)), "normal_forces": (load,), "margins": (speed, 1, load)}
+        arguments = (model.contacts[0].name, place, speed) if method == "after_impact" else (t, place, speed)
+        found = _asked(model, method, *arguments, *rest.get(method, () if method == "after_impact" else (1, load)))
+        values = list(found.values()) if isinstance(found, dict) else found
+        return found is None or bool(np.isfinite(np.asarray(values, dtype=float)).all())
+
+    methods = ["acceleration", "margins"] + ["kinetic_energy"] * (type(model).kinetic_energy is not Model.kinetic_energy)
+    if isinstance(model, ContactModel):
+        methods = ["force", "normal_forces", *methods] + ["after_impact"] * bool(model.contacts)
+    for contact in model.contacts if model.first_order else ():
+        if _asked(model, "after_impact", contact.name, (q,) * size, (v,) * size) is not None:
+            jumps_of_first_order(model, contact.name, (q,) * size, (v,) * size)
+    for method in methods:
+        if is_known(method, v) and not is_known(method, math.nan):
+            names = " or ".join(model.first_order)
+            raise ParameterError(
+                f"{type(model).__name__}.{method} reads the velocity of {names}, which is of first order: its velocity is what the "
+                "model returns for it, so take the terms of that",
+                "model",
+            )
 
 
 def check_contact(model: OneContactModel, impact: ImpactLaw) -> None:
@@ -207,6 +274,19 @@ def _check_mass(model: ContactModel) -> None:
     if _size_of(found) != ("a number" if size == 1 else f"{size} rows of {size} numbers"):
         wanted = "a number, as there is one coordinate" if size == 1 else f"{size} rows of {size} numbers, for {', '.join(names)}"
         raise ParameterError(f"{kind.__name__}.mass_matrix must return {wanted}, got {_size_of(found)}", "model")
+    moving = len(model.moving)
+    others = [[float(found[i][j]) - (i == j) for j in range(size)] for i in range(moving, size)] if size > 1 else []
+    if np.any(others) or (size > moving and size == 1):
+        raise ParameterError(
+            f"{kind.__name__}.mass_matrix must have the rows of the unit matrix for {', '.join(model.first_order)}, as coordinates "
+            "of first order have no inertia",
+            "model",
+        )
+    if model.jumps and size > 1:
+        other = _asked(model, "mass_matrix", tuple(PROBE[1] / (1 + i) if i < moving else PROBE[2] for i in range(size)))
+        if other is None or not np.array_equal(np.array(found, dtype=float), np.array(other, dtype=float)):
+            names = ", ".join(model.first_order)
+            raise ParameterError(f"{kind.__name__}.mass_matrix depends on {names}, which jumps at impacts: leave one out", "model")
     for i, j in itertools.combinations(range(size), 2):
         a, b = found[i][j], found[j][i]
         if a is b or a == b:  # as they are nearly always
@@ -284,6 +364,8 @@ def _probe(model: Model) -> None:
     size, (t, q, v), load = len(model.coordinates), PROBE, DeclaredLoad(Load(frequency=1.0), model)
     state: tuple[Any, Any] = (q, v) if size == 1 else ((q,) * size, (v,) * size)
     single = all(isinstance(each.coordinate, str) for each in getattr(model, "surfaces", ()))
+    if model.first_order and single and not isinstance(model, InGapCoordinates):
+        _check_rates(model)
     if isinstance(model, ContactModel) and single and type(model).force is not ContactModel.force:
         pushed = _asked(model, "force", t, *state, load, *sides_for(model, t, state[0], load))
         if pushed is not None and _size_of(pushed) != ("a number" if size == 1 else f"{size} numbers"):

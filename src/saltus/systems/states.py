@@ -12,6 +12,7 @@ import numpy as np
 from saltus.checks import LIMITS, as_numbers, check_number
 from saltus.errors import ParameterError, near, shown
 from saltus.systems.gap_coordinates import CLOSED_BELOW, InGapCoordinates
+from saltus.systems.load import DeclaredLoad
 from saltus.systems.model import Model
 from saltus.systems.system import System
 
@@ -22,7 +23,8 @@ def read_start(
     """A state, coordinates and then velocities, (d,), from `theta=0.3, velocity=0.1` as `simulate` takes them.
 
     Every coordinate must be given, by its name; those called theta_1, theta_2, ... may be given together, `theta=(0.3, 0.0)`. The
-    velocity is a number with one coordinate, or as many numbers as there are coordinates; 0, the default, is 0 for all. For a
+    velocity is a number with one coordinate, or as many numbers as there are coordinates; 0, the default, is 0 for all. Those of
+    first order are left out, as their velocities follow from the state. For a
     system in coordinates of its gaps the coordinates of the model as it was given may be named instead, all of them.
 
     Parameters
@@ -47,10 +49,20 @@ def read_start(
         return np.concatenate(own.to_gaps(time, *np.split(read_start(own, velocity, coordinates, arguments), 2)))
     names = system.model.coordinates
     positions = _positions(system, coordinates, arguments)
-    speeds = (velocity,) if len(names) == 1 and not _is_sequence(velocity) else _speeds(velocity, len(names))
+    speeds = _speeds(velocity, system.model)
     for name, value in (*zip(names, positions, strict=True), *(("velocity", speed) for speed in speeds)):
         check_number(name, _plain(value))
-    return np.array([*positions, *speeds], dtype=float)
+    return with_rates(system, time, np.array([*positions, *speeds], dtype=float))
+
+
+def with_rates(system: System, time: float, state: np.ndarray) -> np.ndarray:
+    """A state (d,), changed in place: the velocities of coordinates of first order are those that follow from it."""
+    model, load = system.model, DeclaredLoad(system.load, system.model)
+    if model.first_order:
+        q, v = (x.item() if x.size == 1 else tuple(x.tolist()) for x in np.split(state, 2))
+        rates = np.atleast_1d(np.array(model.acceleration(time, q, v, 1, load), dtype=float))
+        state[len(state) - len(model.first_order) :] = rates[len(model.moving) :]
+    return state
 
 
 def read_starts(
@@ -67,7 +79,7 @@ def read_starts(
     """
     names = system.model.coordinates
     positions = _positions(system, coordinates, arguments)
-    speeds = (velocity,) if len(names) == 1 else _speeds(velocity, len(names))
+    speeds = _speeds(velocity, system.model, many=True)
     for name, value in (*zip(names, positions, strict=True), *(("velocity", speed) for speed in speeds)):
         if not _is_sequence(value) and not hasattr(value, "dims"):
             check_number(name, _plain(value))
@@ -93,12 +105,16 @@ def _positions(system: System, coordinates: Mapping[str, Any], arguments: Iterab
     return [given[name] for name in names]
 
 
-def _speeds(velocity: Any, count: int) -> tuple[Any, ...]:
-    """The velocities of several coordinates, or the one in a sequence."""
-    if _is_sequence(velocity) and len(velocity) == count:
-        return tuple(velocity)
+def _speeds(velocity: Any, model: Model, many: bool = False) -> tuple[Any, ...]:
+    """The velocities of all coordinates, of which each number may be an array if there are `many`; 0 for those of first order,
+    whose velocities may be given and are not read."""
+    count, none = len(model.moving), (0.0,) * len(model.first_order)
+    if count == 1 and (many or not _is_sequence(velocity)):
+        return (velocity, *none)
+    if _is_sequence(velocity) and len(velocity) in (count, count + len(none)):
+        return (*velocity[:count], *none)
     if isinstance(velocity, (int, float)) and velocity == 0 and not isinstance(velocity, bool):
-        return (0.0,) * count
+        return (0.0,) * count + none
     raise ParameterError(f"velocity must have {count} value(s), got {shown(velocity)}", "velocity")
 
 
@@ -114,14 +130,15 @@ def _plain(value: Any) -> Any:
 
 def arguments_of(system: System, state: Any) -> dict[str, Any]:
     """A state (coordinates, velocities) as `simulate` takes it."""
-    names, numbers = system.model.coordinates, [float(x) for x in state]
-    velocity = tuple(numbers[len(names) :])
-    return {**dict(zip(names, numbers, strict=False)), "velocity": velocity[0] if len(names) == 1 else velocity}
+    names, moving, numbers = system.model.coordinates, len(system.model.moving), [float(x) for x in state]
+    velocity = tuple(numbers[len(names) : len(names) + moving])
+    return {**dict(zip(names, numbers, strict=False)), "velocity": velocity[0] if moving == 1 else velocity}
 
 
 def state_of(system: System, arguments: Mapping[str, Any]) -> np.ndarray:
     """The inverse of `arguments_of`: coordinates, then velocities, (d,)."""
-    return np.append([arguments[name] for name in system.model.coordinates], arguments["velocity"])
+    velocity = np.append(arguments["velocity"], np.zeros(len(system.model.first_order)))
+    return np.append([arguments[name] for name in system.model.coordinates], velocity)
 
 
 def in_gaps(system: System, states: np.ndarray) -> np.ndarray:
@@ -169,7 +186,7 @@ def check_window(window: Any, system: System) -> Window:
     """A window of the states; for None the default window, with half widths 1.5 around the contact, or around 0 without one.
 
     With several contacts the default window ends at these. With several coordinates both bounds of a state variable may be equal;
-    it then has one value.
+    it then has one value. Velocities of coordinates of first order are left out.
 
     Raises
     ------
@@ -179,13 +196,16 @@ def check_window(window: Any, system: System) -> Window:
     names = system.model.coordinates
     if window is None:
         return _default_window(system)
-    bounds = as_numbers(window, "window")
+    bounds, moving, following = as_numbers(window, "window"), system.model.moving, len(system.model.first_order)
+    if bounds.shape == (2 * len(names) - following, 2):  # velocities that follow from the state may have any bounds
+        bounds = np.concatenate([bounds, [(-HALF_WIDTH, HALF_WIDTH)] * following])
     single = len(names) == 1
     sound = bounds.shape == (2 * len(names), 2) and (np.abs(bounds) <= LIMITS.value).all()
     if not sound or not ((bounds[:, 0] < bounds[:, 1]) if single else (bounds[:, 0] <= bounds[:, 1])).all():
         meant = "((least, largest coordinate), (least, largest velocity))"
         if not single:
-            meant = f"{2 * len(names)} pairs (least, largest), of {', '.join(names)}, then of their velocities,"
+            whose = "their velocities" if moving == names else f"the velocities of {', '.join(moving) or 'none'}"
+            meant = f"{len(names) + len(moving)} pairs (least, largest), of {', '.join(names)}, then of {whose},"
         raise ParameterError(f"window must be {meant}, got {shown(window)}", "window")
     for contact in (each for each in system.model.contacts if each.coordinate in names):
         low, high = bounds[names.index(contact.coordinate)]

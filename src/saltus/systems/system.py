@@ -418,8 +418,8 @@ def image_of(model: Model, states: np.ndarray) -> np.ndarray:
 
 def _contact_images(model: Model, impact: ImpactLaw) -> tuple[int, ...] | None:
     """The index of the mirror image of each contact, then of each friction; None if one has no image or the laws differ."""
-    if model.surfaces:
-        return None  # those of surfaces are not looked for
+    if model.surfaces or (isinstance(model, ContactModel) and model.jumps):
+        return None  # those of surfaces and of jumps are not looked for
     contacts, frictions, count = model.contacts, model.frictions, len(model.contacts)
     found = []
     for contact in contacts:

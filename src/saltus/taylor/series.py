@@ -28,7 +28,8 @@ from saltus.taylor.vectors import CACHE_LINE, DOUBLE, LONG, Coefficient, Vec, ad
 class Rows:
     """The places of the coefficients of a motion, and their largest number.
 
-    The first roots of the tape are the accelerations, one for each position. With `any_order` the function's argument `order` is
+    The first roots of the tape are the accelerations, one for each position; of a position in `first_order` its velocity, so that
+    this row of `velocities` is computed and not integrated, and its acceleration has one coefficient less. With `any_order` the function's argument `order` is
     the highest order of the roots, odd or even; else it is the number of their orders, even and at least that of the orders
     written out.
     """
@@ -39,6 +40,7 @@ class Rows:
     capacity: int  # the most coefficients of a series
     any_order: bool
     numbers: Sequence[Place] = ()  # where further roots that do not change are stored
+    first_order: Sequence[int] = ()  # the positions of first order
 
 
 class Series:
@@ -62,6 +64,11 @@ class Series:
         for node in tape.nodes:
             self.rows.append(self._row(node))
             self._nodes.setdefault(id(self.rows[-1]), node)
+        self._slopes = [(layout.velocities[i], layout.roots[i], self.rows[tape.roots[i]]) for i in layout.first_order]
+        for i in layout.first_order:
+            self.velocities[i] = self.rows[tape.roots[i]]
+        kept = [row for i, row in enumerate(self.velocities) if i not in layout.first_order]
+        self._integrated = [*self.positions, *kept]
         highest = max((row.degree for row in self.rows if row.degree is not None), default=0)
         self.written_out = 2 * (highest // 2 + 1)  # the number of orders whose code is written out
         if not memory.arithmetic.exact:
@@ -81,25 +88,34 @@ class Series:
 
     def write_motion(self, roots: list[int]) -> None:
         """Write all orders of a motion, whose accelerations are the first roots, and put them into memory."""
+        first_order = self.layout.first_order
         for rows, kind in ((self.positions, "coordinate"), (self.velocities, "velocity")):
             for i, row in enumerate(rows):
+                if kind == "velocity" and i in first_order:
+                    continue
                 given = kind in self.memory.leaves
                 row.first.append(self.memory.leaf((kind, i)) if given else self._at(row, LONG(0)))
                 if given:
                     self._put(row.place, LONG(0), row.first[0])
         pulls = [self.rows[root] for root in roots[: len(self.positions)]]
         kept = [
-            (self.memory.pointer(place), self.rows[root]) for place, root in zip(self.layout.roots, roots, strict=False) if place
+            (self.memory.pointer(place), self.rows[root])
+            for i, (place, root) in enumerate(zip(self.layout.roots, roots, strict=False))
+            if place and i not in first_order
         ]
+        slopes = [(*(place and self.memory.pointer(place) for place in places), row) for *places, row in self._slopes]
         numbers = zip(self.layout.numbers, roots[len(self.layout.roots) :], strict=True)
         for _ in self._each_order():
             self._advance()
             if self.starts:
                 for place, root in numbers:
                     self.memory.store(place, self.now(self.rows[root]))
-            for position, velocity, pull in zip(self.positions, self.velocities, pulls, strict=True):
+            for i, (position, velocity, pull) in enumerate(zip(self.positions, self.velocities, pulls, strict=True)):
                 self._integrate(position, self.now(velocity))
-                self._integrate(velocity, self.now(pull))
+                if i not in first_order:
+                    self._integrate(velocity, self.now(pull))
+            for velocity, acceleration, row in slopes:
+                self._write_slope(velocity, acceleration, self.now(row))
             for pointer, row in kept:
                 self._write(pointer, self.now(row))
 
@@ -120,7 +136,7 @@ class Series:
         b.position_at_end(self._head)
         self.order = b.phi(LONG)
         self._number = self.memory.arithmetic.everywhere(b, b.sitofp(self.order, DOUBLE))
-        for row in (*self.positions, *self.velocities):
+        for row in self._integrated:
             row.pair.append(self._at(row, self.order))
         b.position_at_end(newest)
         for ahead in (0, 1):
@@ -187,6 +203,17 @@ class Series:
         if self.ahead != 1:
             self.push(row, value)
         self._write(row.place, value, 1)
+
+    def _write_slope(self, velocity: Any, acceleration: Any, value: Coefficient) -> None:
+        """Put a coefficient of a velocity that is computed into memory, and that of its derivative one order below; those that
+        would come next are 0."""
+        self._write(velocity, value)
+        self._write(velocity, None, 1)
+        if acceleration is not None:
+            number = float(self.order) if self.ahead is None else self._number + float(self.ahead)
+            if not self.starts:
+                self._write(acceleration, multiply(number, value), -1)
+            self._write(acceleration, None)
 
     def _write(self, place: Any, value: Coefficient, more: int = 0) -> None:
         """Put a coefficient of this order, or of a following one, into a series in memory."""

@@ -15,6 +15,7 @@ from saltus.systems import (
     System,
     apart,
     constrained_acceleration,
+    jumps_of_first_order,
     normal_limits,
     numbers,
     reactions,
@@ -110,6 +111,7 @@ class Trace:
     model: str = ""  # its name
     parameters: list[str] = field(default_factory=list)
     dof: int = 1  # of the model
+    first_order: int = 0  # how many of its coordinates, the last ones, are of first order
     columns: int = 0
     paths: tuple[str, ...] = ()  # of the parameters that the last columns are derivatives to
     records: list[tuple[str, int]] = field(default_factory=list)  # dotted path, order of the derivative (see `load_tables.py`)
@@ -127,10 +129,16 @@ class Trace:
     mass: list[Expr] = field(default_factory=list)
     restitution: list[Expr] = field(default_factory=list)
     positions: list[Expr] = field(default_factory=list)
+    jumps: list[Expr] = field(default_factory=list)  # for each contact, the coordinates of first order after an impact on it
     signs: tuple[int, ...] = ()  # of the contacts
     contact_coordinates: tuple[int, ...] = ()  # the coordinate that each contact holds
     ground_speeds: list[Expr] = field(default_factory=list)
     friction_coordinates: tuple[int, ...] = ()  # the coordinate of each friction, then -1 less that of each surface
+
+    @property
+    def first_order_rows(self) -> tuple[int, ...]:
+        """The coordinates of first order, those of the tangent's columns included: `acceleration` has their velocities."""
+        return tuple(i for i in range(len(self.acceleration)) if i % self.dof >= self.dof - self.first_order)
 
     @property
     def several(self) -> bool:
@@ -139,8 +147,8 @@ class Trace:
 
     @property
     def contact_numbers(self) -> list[Expr]:
-        """The mass matrix, E, the positions of the contacts and the speeds of the grounds: what events need."""
-        return [*self.mass, *self.restitution, *self.positions, *self.ground_speeds]
+        """The mass matrix, E, the positions of the contacts, the jumps and the speeds of the grounds: what events need."""
+        return [*self.mass, *self.restitution, *self.positions, *self.jumps, *self.ground_speeds]
 
     def symbol(self, path: str, value: float) -> Expr:
         """The symbol of the number at a dotted path."""
@@ -209,6 +217,7 @@ def trace(
     paths = None if sensitivities is None else check_paths(system, sensitivities)
     sides = system.model.sides
     result = Trace(model=type(system.model).__name__, side_count=len(sides), dof=len(system.model.coordinates))
+    result.first_order = len(system.model.first_order)
     twin = substitute_numbers(system.in_gap_coordinates, result.symbol)
     _name_records(twin.load)
     object.__setattr__(twin, "load", DeclaredLoad(twin.load, twin.model))
@@ -228,6 +237,7 @@ def trace(
     if energy:
         result.margins["kinetic_energy"] = combine("add", ask(model, "kinetic_energy", t, q, v, side, load), 0.0)
     _check(result)
+    _check_rates(result, system.model.coordinates)
     if paths is not None:
         result.append_tangent(paths)
         check_size(result)
@@ -332,6 +342,8 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
     result.mass = [combine("add", entry, 0.0) for row in mass for entry in row]
     result.restitution = [combine("add", entry, 0.0) for row in twin.impact.restitution_matrix(model) for entry in row]
     result.positions = [combine("add", contact.position, 0.0) for contact in contacts]
+    for contact in contacts if result.first_order else ():
+        result.jumps += [combine("add", after, 0.0) for after in jumps_of_first_order(model, contact.name, q, v)]
     result.signs = tuple(contact.sign for contact in contacts)
     result.contact_coordinates = tuple(model.coordinates.index(contact.coordinate) for contact in contacts)
     return constrained_acceleration(model, t, q, v, load, [Expr("free", (), i) for i in range(result.dof)], slides)
@@ -364,6 +376,16 @@ def _check(result: Trace) -> None:
             if node.op in ("time", "record", "velocity"):
                 raise TraceError(f"{result.model}.gap may depend on the coordinate, the side and the parameters only")
     _check_abs(result, expanded)
+
+
+def _check_rates(result: Trace, names: tuple[str, ...]) -> None:
+    """Refuse equations that read the velocity of a coordinate of first order, which they are to give."""
+    for node in ordered([*result.acceleration, *result.reactions, *result.contact_numbers] if result.first_order else []):
+        if node.op == "velocity" and node.value in result.first_order_rows:
+            raise TraceError(
+                f"{result.model} reads the velocity of {names[node.value]}, which is of first order: its velocity is what the model "
+                "returns for it, not a part of the state"
+            )
 
 
 def check_size(traced: Trace, lanes: bool = False) -> None:

@@ -382,9 +382,12 @@ def _grid(system: System, velocity: Any, coordinates: Mapping[str, Any], found: 
     names, given = state_names(system.model.coordinates), {n: v for n, v in coordinates.items() if v is not None}
     if velocity is not None:
         given["velocity"] = velocity
+    chosen = names[: len(names) - len(system.model.first_order)]  # the velocities of the last ones follow from the state
+    if len(chosen) < 2:
+        raise ParameterError(f"{type(system.model).__name__} has the state variable {chosen[0]} alone, and a plane has two", "system")
     for name in given:
-        if name not in names:
-            known = ", ".join(f"{each}=..." for each in names)
+        if name not in chosen:
+            known = ", ".join(f"{each}=..." for each in chosen)
             kind = "coordinate" if len(names) == 2 else "state variable"
             raise ParameterError(f"{type(system.model).__name__} has no {kind} {name!r}; give {known}", name)
     fixed = dict(zip(names, map(float, rest_state(system)), strict=True))

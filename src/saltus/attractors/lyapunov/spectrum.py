@@ -146,7 +146,7 @@ class Exponents(Result):
     Attributes
     ----------
     values
-        (2 n,): the exponents, for n coordinates.
+        (2 n,): the exponents, for n coordinates; of one of first order there is one alone.
     errors
         (2 n,): half widths of 95 % intervals, see `averages.uncertainty`.
     halves
@@ -311,7 +311,7 @@ class _Run:
 
     def __init__(self, system: System, periods: int) -> None:
         self.system, self.length = system, period_length(system)
-        self.stretch = np.full((periods, 2 * len(system.model.coordinates)), np.nan)
+        self.stretch = np.full((periods, system.dimension - len(system.model.first_order)), np.nan)
         self.areas = np.full(periods, np.nan)
         self.condition = 1.0
         self.state: dict[str, Any] = {}
@@ -337,18 +337,20 @@ class _Run:
         if self.note is not None:
             self.stretch[:] = np.nan
             return frame
-        if not found.state.any():
+        count = len(frame)  # behind them are the velocities of coordinates of first order, which follow from the rest
+        derivatives = found.state[:count, :count]
+        if not derivatives.any():
             self.note = "the motion rests at contact, and so do all beside it: nothing is left of where they began"
             self.stretch[:] = -np.inf
             return frame
-        frame, upper = np.linalg.qr(found.state @ frame)
+        frame, upper = np.linalg.qr(derivatives @ frame)
         with np.errstate(divide="ignore"):
             lengths = np.abs(np.diag(upper))
             if self.system.model.holds_coordinates:  # lengths in directions held by contacts and frictions are 0, up to rounding
                 lengths[lengths < LYAPUNOV.rounding * lengths.max()] = 0.0
             self.stretch[p] += np.log(lengths)
         self.areas[p] += contraction.along(found.motion)
-        self.condition = max(self.condition, float(np.linalg.cond(found.state)))
+        self.condition = max(self.condition, float(np.linalg.cond(derivatives)))
         self.state = arguments_of(self.system, found.motion.final_state)
         return np.asarray(frame)
 

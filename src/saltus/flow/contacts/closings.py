@@ -40,6 +40,7 @@ from saltus.flow.contacts.impacts import (
     gap_series,
     hold_coordinates,
     impact_impulses,
+    jump_first_order,
     record_contact_event,
     settle_contact,
 )
@@ -51,6 +52,7 @@ from saltus.flow.contacts.tangent import (
     gap_derivative,
     hold_columns,
     impulse_columns,
+    jump_columns,
     move_columns,
     note_shifts,
     note_velocities,
@@ -182,6 +184,8 @@ def impact_of(motion, t, hit):
     acts = impact_impulses(motion, chosen, motion.rates) if regular else -1
     if acts < 0:
         return -1
+    jump_columns(motion, hit)
+    jump_first_order(motion, hit)
     apply_impulses(motion)
     for i in range(count):
         if chosen >> i & 1:
@@ -264,7 +268,8 @@ def compare_orders(motion, other):
             v = motion.velocities[i]
             size = max(size, abs(motion.coordinates[u + i]), abs(motion.velocities[u + i]), abs(shift * v), abs(shift * a[i, 0]))
             apart = max(apart, abs(motion.coordinates[u + i] - shift * v - other[u + i]))
-            apart = max(apart, abs(motion.velocities[u + i] - shift * a[i, 0] - other[u + dof + i]))
+            if i < own - motion.first_order:  # the velocities of the others follow from the state
+                apart = max(apart, abs(motion.velocities[u + i] - shift * a[i, 0] - other[u + dof + i]))
         if apart > APART * size:
             motion.shifts[j], differs = math.nan, True
     return differs
@@ -333,6 +338,8 @@ def rests_in_a_row(motion, t, near):
                     motion.shifts[j] = -gap_derivative(motion, j, i) / motion.rates[i]
             move_columns(motion, 1.0)
         near, jumped = near & ~block, jumped & ~block
+        jump_columns(motion, block)
+        jump_first_order(motion, block)
         bring_to_rest(motion, block)
         if motion.columns > 0:
             rest_columns(motion, block)

@@ -157,12 +157,34 @@ def impact_impulses(motion, chosen, rates):
 
 
 @lean_jit
+def jump_place(motion, i, k):
+    """The place in `NUMBERS` of a coordinate of first order, by its number, after an impact on a contact."""
+    own, count = motion.own, motion.contacts.shape[0]
+    return own * own + count * count + count + motion.first_order * i + k
+
+
+@lean_jit
+def jump_first_order(motion, hit):
+    """Let the coordinates of first order jump at an impact of the contacts in `hit`, of several by the last; the matrices must be
+    those before it."""
+    for i in range(motion.contacts.shape[0]):
+        for k in range(motion.first_order if hit >> i & 1 else 0):
+            motion.coordinates[motion.own - motion.first_order + k] = motion.solver_numbers[jump_place(motion, i, k)]
+
+
+@lean_jit
 def apply_impulses(motion):
     """Add the effect of the impulses to the velocities."""
     for i in range(motion.own):
         for j in range(motion.contacts.shape[0]):
             gain = motion.inverse[i, motion.contacts[j, ContactColumn.COORDINATE]] * motion.signs[j]
             motion.velocities[i] += gain * motion.impulses[j]
+
+
+@lean_jit
+def jumping(motion, i):
+    """What of a coordinate may jump at an event: its velocity, or the value of one of first order."""
+    return motion.coordinates[i] if i >= motion.own - motion.first_order else motion.velocities[i]
 
 
 @lean_jit
@@ -176,7 +198,7 @@ def record_contact_event(motion, kind, which, t):
     labels[i, 0], labels[i, 1], labels[i, 2], labels[i, 3] = motion.period, kind, which, 0
     values[i, 0] = t
     for k in range(own):
-        values[i, 1 + k] = values[i, 1 + own + k] = motion.velocities[k]
+        values[i, 1 + k] = values[i, 1 + own + k] = jumping(motion, k)
     for k in range(motion.contacts.shape[0]):
         values[i, 1 + 2 * own + k] = 0.0
     for j in range(motion.columns):
@@ -190,7 +212,7 @@ def fill_after(motion):
     values, own = motion.event_values, motion.own
     i = motion.recorded_events - 1
     for k in range(own):
-        values[i, 1 + own + k] = motion.velocities[k]
+        values[i, 1 + own + k] = jumping(motion, k)
     for k in range(motion.contacts.shape[0]):
         values[i, 1 + 2 * own + k] = motion.impulses[k]
 

@@ -380,5 +380,5 @@ def parts_of(numbers, state, env, functions, rows, buffers):
     """The memory of a motion but for its numbers as one named tuple; `rows` are those of contacts, then of frictions."""
     count, steps = functions.signs.size, step_arrays(numbers)
     contacts, frictions = rows[:count], rows[count:]
-    solver = solver_arrays(numbers.own, count, numbers.columns, frictions.shape[0])
+    solver = solver_arrays(numbers.own, count, numbers.columns, frictions.shape[0], numbers.first_order)
     return ContactsParts(state, env, env[0], env[2], functions, contacts, frictions, steps, solver, buffers[0], buffers[1])

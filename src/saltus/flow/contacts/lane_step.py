@@ -54,7 +54,7 @@ def begin_contact(lane, env, state):
         beyond, rate = state[coordinate], state[state.size // 2 + coordinate]
         if not surface:
             beyond = rate
-        beyond -= solved[own * own + count * count + count + k]
+        beyond -= solved[own * own + count * count + count * (1 + sizes.first_order) + k]
         row[FrictionColumn.COORDINATE], row[FrictionColumn.SKIP] = coordinate, 0
         row[FrictionColumn.SLIDES] = 1 if beyond > 0.0 else -1 if beyond < 0.0 else 0
         row[FrictionColumn.MARGIN] = row[FrictionColumn.REACHED] = 0
@@ -282,7 +282,7 @@ def step_all(lanes):
 @inline_jit
 def resolve_all(lanes, hit, which):
     """Apply the impact law in the lanes in `hit`, together where that is possible; returns the resolved lanes."""
-    resolved = resolve_impacts(lanes, hit, which)
+    resolved = 0 if lanes.sizes.jumps > 0 else resolve_impacts(lanes, hit, which)
     waiting = hit & ~resolved
     while waiting:
         i, impact = first_lane(waiting), lanes.helpers.impact
@@ -302,7 +302,7 @@ def record_step(lanes, step, single, past, moved):
         x, v = of_free(lanes, lanes.new_position, step.contact), of_free(lanes, lanes.new_velocity, step.contact)
         record_range(lanes, 0, Stretch(begin, tau, v_begin, x, v, step.h, step.bend), moved)
     else:
-        v_begin = select(after, lanes.ended_velocity[0], lanes.velocity[0])
+        v_begin = select(after, lanes.ended_velocity[0], lanes.velocities[0][0])
         x, v = lanes.new_position[0], lanes.new_velocity[0]
         record_range(lanes, 0, Stretch(begin, tau, v_begin, x, v, step.h, step.bend), moved)
         record_others(lanes, step, past, moved)

@@ -110,9 +110,9 @@ def rows_of_zeros(rows, columns):
 
 
 @jit
-def solver_arrays(own, count, columns, frictions):
+def solver_arrays(own, count, columns, frictions, first_order):
     """The arrays in which impacts are solved for, for so many columns of a tangent."""
-    most, numbers = max(2 * own, count + 1), own * own + count * count + count + frictions
+    most, numbers = max(2 * own, count + 1), own * own + count * count + count * (1 + first_order) + frictions
     return SolverArrays(
         zeros(numbers),
         rows_of_zeros(own, own),

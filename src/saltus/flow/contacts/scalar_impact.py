@@ -7,7 +7,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.flow.contacts.impacts import apply_impulses, closed_bits, fill_contact_matrices, impact_impulses, settle_contact
+from saltus.flow.contacts.impacts import (
+    apply_impulses,
+    closed_bits,
+    fill_contact_matrices,
+    impact_impulses,
+    jump_first_order,
+    settle_contact,
+)
 from saltus.flow.contacts.lane_handoff import functions_of
 from saltus.flow.contacts.lane_impacts import read_contacts, write_closed
 from saltus.flow.contacts.layout import ContactColumn
@@ -30,6 +37,7 @@ def contacts_impact(lane, hit):
     (array, state, contacts, solver), own, env = lane.impact_space, lane.sizes.own, own_env(lane)
     numbers, rates, speed = array[0], solver.rates, np.inf
     numbers.dof, numbers.own, numbers.piece = own, own, lane.piece
+    numbers.first_order = lane.sizes.first_order
     parts = LaneImpactParts(state_arrays(numbers, state), env, env[0], functions_of(lane), contacts, solver)
     motion = by_reference(MotionMemory(numbers, parts))
     for row in range(2 * own):  # velocities follow the positions in both memories
@@ -41,6 +49,7 @@ def contacts_impact(lane, hit):
             speed = min(speed, -rates[i])
     if not regular or not speed > 0.0 or impact_impulses(motion, chosen, rates) < 0:
         return 0
+    jump_first_order(motion, hit)
     apply_impulses(motion)
     free = (1 << own) - 1
     for i in range(contacts.shape[0]):

@@ -28,10 +28,18 @@ from saltus.flow.contacts.impacts import (
     fill_contact_matrices,
     hold_coordinates,
     impact_impulses,
+    jump_first_order,
     restitution,
 )
 from saltus.flow.contacts.layout import ContactColumn, SegmentEnd, SegmentPlan, solver_arrays
-from saltus.flow.contacts.tangent import fill_slopes, gap_derivative, hold_columns, impulse_columns, note_velocities
+from saltus.flow.contacts.tangent import (
+    fill_slopes,
+    gap_derivative,
+    hold_columns,
+    impulse_columns,
+    jump_columns,
+    note_velocities,
+)
 from saltus.flow.kernel.layout import EventCode
 from saltus.flow.kernel.memory import CONTACT_SEGMENTS, ContactsSegmentParts, MotionMemory
 from saltus.flow.kernel.steps import columns_at_event, expand, move, state_arrays, step_arrays
@@ -117,6 +125,8 @@ def given_impact(motion, hit, after):
     if acts < 0 or not stays_closed(motion, count, acts, after):
         return False
     note_velocities(motion, 0.0)
+    jump_columns(motion, 1 << hit)
+    jump_first_order(motion, 1 << hit)
     for i in range(count):
         motion.right[i] = motion.rates[i]
         for k in range(count):
@@ -303,7 +313,7 @@ def follow_contact_segments(numbers, env, functions, contacts, request, results)
     """
     record, count = numbers[0], contacts.shape[0]
     state = state_arrays(record, np.zeros(2 * record.dof + record.columns))
-    solver = solver_arrays(record.own, count, record.columns, 0)
+    solver = solver_arrays(record.own, count, record.columns, 0, record.first_order)
     parts = ContactsSegmentParts(
         state, env, env[0], functions, contacts, step_arrays(record), solver, np.zeros(record.order + 2), np.zeros(2)
     )

@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from saltus.flow.contacts.complementarity import acting, invert
-from saltus.flow.contacts.impacts import frozen_accumulation, restitution
+from saltus.flow.contacts.impacts import frozen_accumulation, jump_place, restitution
 from saltus.flow.contacts.layout import APART, RELATIVE_STEP, TIED, ContactColumn, ImpactDetail, copy_all
 from saltus.flow.kernel.layout import EventCode
 from saltus.flow.kernel.steps import columns_at_event, expand
@@ -70,6 +70,18 @@ def lift_rate(motion, j, i):
     """The derivative of the rate of a contact's gap along column j."""
     own, coordinate = motion.own, motion.contacts[i, ContactColumn.COORDINATE]
     return motion.signs[i] * motion.velocities[own * (1 + j) + coordinate]
+
+
+@lean_jit
+def jump_columns(motion, hit):
+    """The columns of coordinates of first order at an impact, as `jump_first_order`, which follows."""
+    own, first = motion.own, motion.first_order
+    if first > 0 and motion.columns > 0:
+        fill_slopes(motion)
+        for i in range(motion.contacts.shape[0]):
+            for k in range(first if hit >> i & 1 else 0):
+                for j in range(motion.columns):
+                    motion.coordinates[own * (2 + j) - first + k] = slope(motion, j, jump_place(motion, i, k))
 
 
 @lean_jit
@@ -298,7 +310,8 @@ def fall_back(motion, t, closed, j):
             u[a], z[a] = 0.0, math.copysign(1.0, sign) * fallen[a]
         expand(motion, t, 1.0, 0)
         for a in range(own):
-            lost[a] += sign * motion.acceleration_series[own * (1 + j) + a, 0]
+            gained = motion.velocity_series if a >= own - motion.first_order else motion.acceleration_series
+            lost[a] += sign * gained[own * (1 + j) + a, 0]
             u[a] = math.copysign(1.0, sign) * motion.velocities[a]
         fill_slopes(motion)
         for a in range(own):
@@ -307,6 +320,8 @@ def fall_back(motion, t, closed, j):
                     lost[a] += sign * motion.inverse[a, b] * slope(motion, j, own * b + c) * fallen[c]
     for a in range(own):
         u[a], z[a] = after[a], rates[a] - lost[a]
+        if a >= own - motion.first_order:
+            u[a] -= lost[a]
     for i in range(count):
         right[i] = lift_rate(motion, j, i)
     project(motion, closed, z)

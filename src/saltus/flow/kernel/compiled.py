@@ -72,6 +72,7 @@ class Sizes(NamedTuple):
     rows: int  # of the workspace
     sides: int
     steep: int  # whether steps are checked
+    first_order: int  # how many of the model's own coordinates, the last ones, are of first order
     own: int  # the model's own coordinates
     columns: int  # of the tangent
 
@@ -182,7 +183,7 @@ def load_structure(trace: Trace) -> Structure:
     several = ("series", "matrices", "matrix_slopes", "tangent")
     names = several if trace.several else ("series", "contact_series", "reset", "contact_damping", "tangent")
     stops, steep = len(trace.reactions) + len(trace.margins), int(is_steep(trace.acceleration))
-    sizes = Sizes(len(trace.acceleration), stops, 1, trace.side_count, steep, trace.dof, trace.columns)
+    sizes = Sizes(len(trace.acceleration), stops, 1, trace.side_count, steep, trace.first_order, trace.dof, trace.columns)
     return Structure(
         sizes,
         max(1, len(constants(trace))),
@@ -268,7 +269,8 @@ def _series(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
     targets = [*(("a", i) for i in rows), *gap, *(("m", j) for j in range(len(trace.reactions) + len(trace.margins)))]
     leaves = LEAVES | _free(trace)
     places = Places(("t", "origin", "side", "env", "piece", "q", "v", "a", "g", "m", "w", "order"), leaves)
-    layout = Rows([("q", i) for i in rows], [("v", i) for i in rows], targets, MOST_COEFFICIENTS, any_order=True)
+    positions, velocities, first_order = [("q", i) for i in rows], [("v", i) for i in rows], trace.first_order_rows
+    layout = Rows(positions, velocities, targets, MOST_COEFFICIENTS, any_order=True, first_order=first_order)
     motion = tape([*trace.acceleration, *motion_roots(trace)], known, series=True)
     return _function("series", places, SeriesOf(layout, motion))
 
@@ -288,16 +290,21 @@ def _contact_series(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
     return _function("contact_series", places, SeriesOf(layout, tape([trace.contact_acceleration], known, series=True)))
 
 
+def _moving(trace: Trace) -> dict[str, tuple[str, int]]:
+    """The places of coordinates and velocities in the kernel's state."""
+    return HERE | {"velocity": ("state", len(trace.acceleration))}
+
+
 def _matrices(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
-    """The mass matrix, E, the positions of the contacts and the speeds of the grounds at a state, one after the other."""
+    """The mass matrix, E, positions of the contacts, jumps of first order, speeds of the grounds at a state, one after the other."""
     roots = trace.contact_numbers
-    places = Places(("env", "piece", "state", "out"), ENV | HERE)
+    places = Places(("env", "piece", "state", "out"), ENV | _moving(trace))
     return _function("matrices", places, [Case(tape(roots, known), [("out", i) for i in range(len(roots))])])
 
 
 def _matrix_slopes(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
     """The derivatives, along each column of the tangent, of the numbers that `matrices` fills; one column after the other."""
-    roots, places = event_derivatives.number_slopes(trace), Places(("env", "piece", "state", "out"), ENV | HERE)
+    roots, places = event_derivatives.number_slopes(trace), Places(("env", "piece", "state", "out"), ENV | _moving(trace))
     cases = [Case(tape(roots, known), [("out", i) for i in range(len(roots))])] if roots else []
     return _function("matrix_slopes", places, cases)
 

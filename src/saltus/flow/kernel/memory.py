@@ -57,11 +57,13 @@ MOTION = np.dtype(
         ("workspace_rows", _WHOLE),
         ("sides", _WHOLE),  # of the contact
         ("checked", _WHOLE),  # whether steps are checked: the structure has functions with steep changes that a series may miss
+        ("first_order", _WHOLE),  # how many of the model's own coordinates, the last ones, are of first order
         ("own", _WHOLE),  # the model's own coordinates
         ("columns", _WHOLE),  # of the tangent
     ]
 )
-SIZES = ["dof", "margin_count", "workspace_rows", "sides", "checked", "own", "columns"]  # in the order of `Structure.sizes`
+# In the order of `Structure.sizes`.
+SIZES = ["dof", "margin_count", "workspace_rows", "sides", "checked", "first_order", "own", "columns"]
 
 
 def motion_record(order: int, sizes: tuple[int, ...]) -> np.ndarray:

@@ -52,14 +52,22 @@ def columns_at_event(motion, kind, detail, t, side):
 
 @lean_jit
 def expand(motion, t, side, order):
-    """Expand the state in its Taylor series at time `t`; returns the size of the model's own part of the state."""
+    """Expand the state in its Taylor series at time `t`; returns the size of the model's own part of the state.
+
+    The velocities of coordinates of first order follow from the state, and are put into it.
+    """
     q, v, a, size = motion.coordinate_series, motion.velocity_series, motion.acceleration_series, 0.0
     g, m, w = motion.gap_series, motion.margin_series, motion.recurrences
     for i in range(motion.dof):
         q[i, 0], v[i, 0] = motion.coordinates[i], motion.velocities[i]
-        if i < motion.own:
+        if i < motion.own - motion.first_order:
             size = max(size, abs(q[i, 0]), abs(v[i, 0]))
+        elif i < motion.own:
+            size = max(size, abs(q[i, 0]))
     motion.series(t, motion.origin, side, motion.env, motion.piece, q, v, a, g, m, w, order)
+    if motion.first_order > 0:
+        for i in range(motion.dof):
+            motion.velocities[i] = v[i, 0]
     return size
 
 
@@ -116,8 +124,10 @@ def leaps(motion, t, side, h, size):
         q_end[i, 0], v_end[i, 0] = horner(q[i], order, h), horner(v[i], order, h)
     motion.series(t + h, motion.origin, side, motion.env, motion.piece, q_end, v_end, a_end, g_end, m_end, w, 0)
     defect = 0.0
-    for i in range(motion.own):
+    for i in range(motion.own - motion.first_order):
         defect = max(defect, abs(a_end[i, 0] - horner(a[i], order, h)))
+    for i in range(motion.own - motion.first_order, motion.own):
+        defect = max(defect, abs(v_end[i, 0] - horner(v[i], order, h)))
     return defect > DEFECT * motion.tolerance * max(size, SMALLEST) / h
 
 

@@ -208,7 +208,7 @@ def _series(trace: Trace, plan: MemoryPlan, known: dict[Expr, int]) -> WrittenFu
     targets = [*rows(parts.accelerations, plan.own), *columns, *rows(parts.margins, plan.stops)]
     positions, velocities = rows(parts.positions, plan.rows), rows(parts.velocities, plan.rows)
     margins = motion_roots(trace)[trace.gap is not None :]
-    layout = Rows(positions, velocities, targets, SERIES_LENGTH, any_order=False)
+    layout = Rows(positions, velocities, targets, SERIES_LENGTH, any_order=False, first_order=trace.first_order_rows)
     places = Places(("m", "order"), _leaves(plan, SLOTS.now, parts.position, parts.velocity))
     return _function("lane_series", places, SeriesOf(layout, tape([*trace.acceleration, *margins], known, series=True)))
 

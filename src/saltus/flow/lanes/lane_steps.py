@@ -51,10 +51,12 @@ NEARLY = 1e-5  # of the time, and of the slope: after a shorter move the root is
 
 @inline_jit
 def state_size(lanes):
-    """The largest coordinate or velocity."""
-    size = splat(SMALLEST)
-    for row in range(lanes.sizes.own):
+    """The largest coordinate or velocity, without the velocities of coordinates of first order."""
+    size, second_order = splat(SMALLEST), lanes.sizes.own - lanes.sizes.first_order
+    for row in range(second_order):
         size = maximum(size, maximum(absolute(lanes.position[row]), absolute(lanes.velocity[row])))
+    for row in range(second_order, lanes.sizes.own):
+        size = maximum(size, absolute(lanes.position[row]))
     return size
 
 
@@ -278,14 +280,16 @@ def margins_certain(lanes, h):
 
 @lean_jit
 def series_true(lanes, h, size):
-    """Bits of the lanes whose series give, at the end of the step, the acceleration that the model has there.
+    """Bits of the lanes whose series give, at the end of the step, the acceleration that the model has there, of a coordinate of
+    first order its velocity.
 
     The new state must be in place. See `steps.leaps`.
     """
     lanes.code.field(lanes.memory)
     defect = splat(0.0)
     for row in range(lanes.sizes.own):
-        series, slope = lanes.accelerations[row], splat(0.0)
+        first_order = row >= lanes.sizes.own - lanes.sizes.first_order
+        series, slope = lanes.velocities[row] if first_order else lanes.accelerations[row], splat(0.0)
         for k in range(lanes.sizes.order - 1, -1, -1):
             slope = fma(slope, h, series[k])
         defect = maximum(defect, absolute(lanes.after_velocity[row] - slope))

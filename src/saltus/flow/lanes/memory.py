@@ -127,6 +127,8 @@ class LaneSizes(NamedTuple):
     """Numbers of a structure and of a call."""
 
     own: int  # the model's own coordinates
+    first_order: int  # how many of these, the last ones, are of first order
+    jumps: int  # whether those jump at impacts
     rows: int  # those of the tangent's columns included
     columns: int  # of the tangent
     margins: int

@@ -125,7 +125,7 @@ def record_others(lanes, step, past, chosen):
     begin = select(mask(past), lanes.period_end - lanes.now, splat(0.0))
     for row in range(1, lanes.sizes.own):
         _, _, _, bend = sweep(lanes, row, step.h)
-        v_begin = select(mask(past), lanes.ended_velocity[row], lanes.velocity[row])
+        v_begin = select(mask(past), lanes.ended_velocity[row], lanes.velocities[row][0])
         x, v = lanes.new_position[row], lanes.new_velocity[row]
         record_range(lanes, row, Stretch(begin, step.taken, v_begin, x, v, step.h, bend), chosen)
 
@@ -147,7 +147,7 @@ def pass_ends(lanes, step, past):
         if row > 0:
             _, _, _, bend = sweep(lanes, row, step.h)
         x, v = lanes.ended_position[row], lanes.ended_velocity[row]
-        record_range(lanes, row, Stretch(splat(0.0), since, lanes.velocity[row], x, v, step.h, bend), past)
+        record_range(lanes, row, Stretch(splat(0.0), since, lanes.velocities[row][0], x, v, step.h, bend), past)
     keep_ended(lanes, past)
 
 

@@ -233,7 +233,8 @@ class Lanes:
         """A group of lanes for one thread, still without work; `control` = [whether to stop, forcing periods done so far]."""
         trace, own, plan = self.program.trace, self.own, self.plan
         contacts, frictions = len(trace.signs), len(trace.friction_coordinates)
-        numbers = own * own + contacts * contacts + contacts + frictions if self.several else 3
+        jumps = contacts * trace.first_order
+        numbers = own * own + contacts * contacts + contacts + jumps + frictions if self.several else 3
         nothing = np.zeros((0, 0))
         return LaneGroup(
             memory=self._memory(),
@@ -265,7 +266,7 @@ class Lanes:
             np.zeros(1, dtype=MOTION),
             np.zeros(2 * own),
             rows,
-            solver_arrays(own, contacts, 0, len(trace.friction_coordinates)),
+            solver_arrays(own, contacts, 0, len(trace.friction_coordinates), trace.first_order),
         )
 
     def _sizes(self) -> LaneSizes:
@@ -273,6 +274,8 @@ class Lanes:
         sizes, trace, plan = self.program.structure.sizes, self.program.trace, self.plan
         return LaneSizes(
             own=sizes.own,
+            first_order=sizes.first_order,
+            jumps=int(any(jump.op != "coordinate" for jump in trace.jumps)),
             rows=sizes.dof,
             columns=sizes.columns,
             margins=sizes.stops,

@@ -119,7 +119,7 @@ def step_all(lanes):
         resolved, unsolved, captured = reset(lanes, hit)
         doubtful |= unsolved
     moved = lanes.busy & ~lanes.scalar & ~doubtful & ~waits
-    begin, v_begin = splat(0.0), lanes.velocity[0]
+    begin, v_begin = splat(0.0), lanes.velocities[0][0]
     past = moved & bits(lanes.new_time > lanes.period_end)
     if past and lanes.sizes.ends_asked > 0:
         pass_ends(lanes, step, past)

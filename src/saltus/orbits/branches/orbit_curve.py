@@ -184,7 +184,7 @@ def torus(point: OrbitPoint) -> float:
     if point.orbit.grazes:
         return math.nan
     with np.errstate(all="ignore"):
-        if len(values) == 2:
+        if len(values) == 2 and not point.orbit.equations.following.size:
             half = float(np.prod(_areas(evaluation.here) / _areas(evaluation.there)))
             product = (half**2 if point.orbit.symmetric else half) - 1.0
         else:

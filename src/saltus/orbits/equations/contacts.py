@@ -120,7 +120,7 @@ class ContactsEquations(OrbitEquations):
             if self.plan[0, SegmentPlan.ALONG] >> i & 1
         }
         free = [i for i in range(self.own) if i not in held]
-        return np.array([*free, *(self.own + i for i in free)], dtype=int)
+        return np.setdiff1d([*free, *(self.own + i for i in free)], self.following).astype(int)
 
     @property
     def size(self) -> int:

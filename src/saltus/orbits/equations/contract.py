@@ -350,6 +350,12 @@ class OrbitEquations(ABC):
         """Degrees of freedom."""
         return self._follower.own
 
+    @cached_property
+    def following(self) -> np.ndarray:
+        """The places in a state of the velocities of coordinates of first order, which follow from the others: as unknowns they
+        are 0, and the equations have no other derivatives to them."""
+        return np.arange(2 * self.own - len(self.system.model.first_order), 2 * self.own)
+
     @property
     def margins(self) -> tuple[str, ...]:
         """The model's margins, in the order of `extremes`."""

@@ -260,8 +260,9 @@ class OneContactEquations(OrbitEquations):
         parameters = sign * columns[0, : 2 * own, 2 * own :]
         if FREQUENCY in self.paths:
             parameters[:, self.paths.index(FREQUENCY)] -= sign * rates * self.closing / frequency**2
-        here, there = sign * columns[:, : 2 * own, : 2 * own], -np.eye(2 * own)[None]
-        return OrbitEvaluation(sign * state - later, here, there, parameters, ends, extremes)
+        here, there, end = sign * columns[:, : 2 * own, : 2 * own], -np.eye(2 * own)[None], sign * state
+        here[:, self.following] = parameters[self.following] = end[self.following] = 0.0
+        return OrbitEvaluation(end - later, here, there, parameters, ends, extremes)
 
     def _crossing(
         self, following: np.ndarray, frequency: float, segments: Segments, followed: FollowedSegments

@@ -207,6 +207,7 @@ class WholeMotionEquations(OrbitEquations):
             sampled, half = SampledMotion.of(motion), motion.at(0.5 * (motion.start + motion.time))
             events = sequence_of(motion, sampled, self.images if self.signature.symmetric else None)
             middle, extremes = np.concatenate([np.atleast_1d(part) for part in half]), self._extremes(sampled)
+            middle[self.following] = 0.0
             evaluation = replace(evaluation, extremes=extremes, events=events, middle=middle)
             self._latest = place, (motion, evaluation)
         return evaluation
@@ -233,7 +234,8 @@ class WholeMotionEquations(OrbitEquations):
         after, state = np.append(np.atleast_1d(motion.position), np.atleast_1d(motion.velocity)), found.state
         if self.signature.symmetric:
             after, state, parameters = (image_of(system.model, numbers.T).T for numbers in (after, state, parameters))
-        here, there = state[None], -np.eye(len(after))[None]
+        here, there = state[None].copy(), -np.eye(len(after))[None]
+        here[:, self.following] = parameters[self.following] = after[self.following] = 0.0
         residual, impacts = after - unknowns, modes_in(self.system).listed(motion)
         return motion, WholeMotionEvaluation(residual, here, there, parameters, impacts, self._extremes(None), None, None)
 
@@ -247,6 +249,7 @@ class WholeMotionEquations(OrbitEquations):
         later = ahead >= math.tau * signature.span  # in the second half of a symmetric orbit, the image of the first half
         times = motion.start + np.where(later, ahead - math.tau * signature.span, ahead) / self.frequency(values)
         states = np.array([np.concatenate([np.atleast_1d(part) for part in motion.at(time)]) for time in times.tolist()])
+        states[:, self.following] = 0.0
         states = np.where(later[:, None], image_of(self.system.model, states) if later.any() else states, states)
         return np.asarray(states[np.abs(states - near).max(axis=1).argmin()])
 
