@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -190,7 +190,9 @@ def energies(of: Followed, *, periods: int | None = None) -> xarray.Dataset:
     f_0 being the part of f without loads that is even in v, f_c that with the channel c alone. The work of a load is int v (f_c -
     f_0) dt; damping takes -int v f_d dt; an impact takes [v- M- v- - v+ M+ v+] / 2; the potential energy changes by -int [v f_0 +
     v M' v / 2] dt. A friction of the force F on a ground of speed w takes int F (w - v) dt, of which the ground supplies int F w
-    dt. Velocities are relative to the ground: of a ground that moves by a channel the force of inertia does the work.
+    dt. Velocities are relative to the ground: of a ground that moves by a channel the force of inertia does the work. A coordinate
+    of first order, such as a voltage, takes -int v [f_0 - f_0'] dt, with f_0' the forces where it is 0: of an orbit that is the
+    mean electric power of a harvester, whose potential energy has f_0' then.
 
     Parameters
     ----------
@@ -203,8 +205,8 @@ def energies(of: Followed, *, periods: int | None = None) -> xarray.Dataset:
     -------
     xarray.Dataset
         Over `part`: `energy` and `power`, the energy over the time, and the `role`: supplied (`load.force`, `load.together` of
-        channels that act on one another, `ground.belt`), dissipated (`damping`, `friction.belt`, `impact.left`; `impact` of a
-        single contact) or stored (`kinetic`, `potential`). A contact that is not struck has no part: what all take together is
+        channels that act on one another, `ground.belt`), dissipated (`damping`, `friction.belt`, `impact.left`, `impact` of a
+        single contact, `first_order.voltage`) or stored (`kinetic`, `potential`). A contact that is not struck has no part: what all take together is
         the sum where `part.str.startswith("impact")`, of no parts 0. The attribute `defect` is what is missing in the sum by
         rounding, `duration` is D. Of loads on a metainterface the unit is that of K2.
 
@@ -286,7 +288,7 @@ def mean_dissipated_power(of: Followed, *, periods: int | None = None) -> float:
 
 def _parts(course: SampledPart) -> Parts:
     """The energies by their parts, those of the loads first."""
-    load, v = course.system.load, course.velocity
+    load, v = course.system.load, _moving(course, course.velocity)
     mass = _mass(course, course.time, course.position, course.side)
     forth, back = (_force(course, load, mass, w) for w in (v, -v))
     own = _even_force(course, Load(frequency=load.frequency), mass)
@@ -299,12 +301,42 @@ def _parts(course: SampledPart) -> Parts:
     if len(load.channels) > 1 and np.abs(left).max(initial=0.0) > 1e-12 * np.abs(forth).max(initial=0.0):
         parts[SUPPLIED, "load.together"] = course.integral(v * left)
     parts |= _friction_parts(course, mass, forth)
+    if course.system.model.first_order:
+        taken, own = _first_order_parts(course, own, mass)
+        parts |= taken
     parts[DISSIPATED, "damping"] = -course.integral(v * (forth - back) / 2)
     parts |= _impact_parts(course)
     parts[STORED, "kinetic"] = _kinetic(course, -1) - _kinetic(course, 0)
     growing = np.einsum("in,ijn,jn->n", v, course.rate(mass), v) / 2
     parts[STORED, "potential"] = -course.integral(np.sum(v * own, axis=0) + growing)
     return parts
+
+
+def _moving(course: SampledPart, velocity: np.ndarray) -> np.ndarray:
+    """Velocities (coordinates, n), 0 for those of first order, which have no inertia and on which no force does work."""
+    count = len(course.system.model.moving)
+    return np.concatenate([velocity[:count], 0.0 * velocity[count:]]) if count < len(velocity) else velocity
+
+
+def _first_order_parts(course: SampledPart, own: np.ndarray, mass: np.ndarray) -> tuple[Parts, np.ndarray]:
+    """What each coordinate of first order takes by the forces that it changes, and the forces where all of them are 0."""
+    model, load, v = course.system.model, Load(frequency=course.system.load.frequency), _moving(course, course.velocity)
+    count, parts = len(model.moving), Parts()
+
+    def forces(kept: int) -> np.ndarray:
+        position = course.position.copy()
+        position[[i for i in range(count, len(position)) if i != kept]] = 0.0
+        return _even_force(replace(course, position=position), load, mass)
+
+    without = forces(-1)
+    left = own - without
+    for i, name in enumerate(model.first_order):
+        alone = forces(count + i) - without
+        parts[DISSIPATED, f"first_order.{name}"] = -course.integral(v * alone)
+        left = left - alone
+    if len(model.first_order) > 1 and np.abs(v * left).max(initial=0.0) > 1e-12 * np.abs(v * own).max(initial=0.0):
+        parts[DISSIPATED, "first_order.together"] = -course.integral(v * left)
+    return parts, without
 
 
 def _friction_parts(course: SampledPart, mass: np.ndarray, force: np.ndarray) -> Parts:
@@ -341,7 +373,8 @@ def _impact_losses(course: SampledPart) -> Iterator[tuple[str, float]]:
     if not late.any():
         return
     times, side = impacts.time[late], impacts.side[late].astype(float)
-    before, after = (np.reshape(v[late], (times.size, -1)).T for v in (impacts.velocity_before, impacts.velocity_after))
+    both = (np.reshape(v[late], (times.size, -1)).T for v in (impacts.velocity_before, impacts.velocity_after))
+    before, after = (_moving(course, v) for v in both)
     names, beyond = ["impact"] * times.size, side
     if isinstance(system.model, ContactModel):
         places = course.motion._states(times)[0]
@@ -361,6 +394,7 @@ def _kinetic(course: SampledPart, place: int) -> float:
     """The kinetic energy at the beginning (0) or at the end (-1) of the course."""
     time = np.array([(course.begin, course.end)[place]])
     q, v, side = course.motion._states(time)
+    v = _moving(course, v)
     return float(np.einsum("in,ijn,jn->n", v, _mass(course, time, q, np.where(side == 0, 1, side)), v)[0]) / 2
 
 

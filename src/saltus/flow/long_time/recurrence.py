@@ -352,9 +352,9 @@ def ensemble_from(
 
 def _as_arguments(system: System, states: np.ndarray) -> tuple[dict[str, Any], Any]:
     """States (n, d) as `simulate_many` takes them: coordinates by name, and the velocity."""
-    names = system.model.coordinates
-    velocities = tuple(states[:, len(names) + i] for i in range(len(names)))
-    return {name: states[:, i] for i, name in enumerate(names)}, velocities[0] if len(names) == 1 else velocities
+    names, moving = system.model.coordinates, system.model.moving
+    velocities = tuple(states[:, len(names) + i] for i in range(len(moving)))
+    return {name: states[:, i] for i, name in enumerate(names)}, velocities[0] if len(moving) == 1 else velocities
 
 
 def last_states(system: System, result: xarray.Dataset) -> np.ndarray:

@@ -395,7 +395,8 @@ def _add_contacts(motion: Motion, dataset: xarray.Dataset, side: np.ndarray) -> 
         unit = {"units": model.unit_of(name)}
         dataset[f"impact_{name}"] = ("impact", position[i], unit)
         for when, velocity in (("before", impacts.velocity_before), ("after", impacts.velocity_after)):
-            dataset[f"impact_{rate_name(name, names)}_{when}"] = ("impact", velocity[:, i], unit)
+            jumping = name if name in model.first_order else rate_name(name, names)
+            dataset[f"impact_{jumping}_{when}"] = ("impact", velocity[:, i], unit)
 
 
 def rate_name(name: str, names: tuple[str, ...]) -> str:
