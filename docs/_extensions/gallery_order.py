@@ -10,7 +10,7 @@ TASKS = (  # what people do after their first motion, named in the gallery's fir
 )
 ORDER = (
     *("quickstart", *TASKS, "potential_wells", "coming_to_rest", "rocking_block", "housner", "overturning", "bilinear"),
-    *("duffing", "two_stops", "belt", "wall_orbits", "up_and_down", "grazing", "orbits", "period_doubling"),
+    *("duffing", "two_stops", "piezo_harvester", "belt", "wall_orbits", "up_and_down", "grazing", "orbits", "period_doubling"),
     *("resting_orbit", "response_spectrum", "chaos", "capture", "erosion", "ensemble", "stability_chart", "sensitivities"),
     *("smoothing", "two_layers", "cell_chain", "impact_pair", "record", "physical_units"),
 )

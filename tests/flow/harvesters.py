@@ -70,7 +70,11 @@ def by_dop853(system: saltus.System, state: tuple[float, float, float], end: flo
 
     def rates(t: float, y: Any) -> list[float]:
         push = -ground.derivative(t, system.load.frequency, 2)
-        return [y[2], model.coupling * y[2] - y[1] / model.resistance, -y[0] - model.damping * y[2] - model.coupling * y[1] + push]
+        return [
+            y[2],
+            model.coupling * y[2] - y[1] / model.resistance,
+            -y[0] - model.damping * y[2] - model.coupling * y[1] + push,
+        ]
 
     def gap(t: float, y: Any) -> float:
         return float(model.stop - y[0])

@@ -190,9 +190,10 @@ def energies(of: Followed, *, periods: int | None = None) -> xarray.Dataset:
     f_0 being the part of f without loads that is even in v, f_c that with the channel c alone. The work of a load is int v (f_c -
     f_0) dt; damping takes -int v f_d dt; an impact takes [v- M- v- - v+ M+ v+] / 2; the potential energy changes by -int [v f_0 +
     v M' v / 2] dt. A friction of the force F on a ground of speed w takes int F (w - v) dt, of which the ground supplies int F w
-    dt. Velocities are relative to the ground: of a ground that moves by a channel the force of inertia does the work. A coordinate
-    of first order, such as a voltage, takes -int v [f_0 - f_0'] dt, with f_0' the forces where it is 0: of an orbit that is the
-    mean electric power of a harvester, whose potential energy has f_0' then.
+    dt. Velocities are relative to the ground: of a ground that moves by a channel the force of inertia does the work.
+
+    A coordinate of first order, such as a voltage, takes -int v [f_0 - f_0'] dt, with f_0' the forces where it is 0, which the
+    potential energy has then. Over a period of an orbit that is the electric energy which a harvester delivers.
 
     Parameters
     ----------
@@ -206,9 +207,9 @@ def energies(of: Followed, *, periods: int | None = None) -> xarray.Dataset:
     xarray.Dataset
         Over `part`: `energy` and `power`, the energy over the time, and the `role`: supplied (`load.force`, `load.together` of
         channels that act on one another, `ground.belt`), dissipated (`damping`, `friction.belt`, `impact.left`, `impact` of a
-        single contact, `first_order.voltage`) or stored (`kinetic`, `potential`). A contact that is not struck has no part: what all take together is
-        the sum where `part.str.startswith("impact")`, of no parts 0. The attribute `defect` is what is missing in the sum by
-        rounding, `duration` is D. Of loads on a metainterface the unit is that of K2.
+        single contact, `first_order.voltage`) or stored (`kinetic`, `potential`). A contact that is not struck has no part: what
+        all take together is the sum where `part.str.startswith("impact")`, of no parts 0. The attribute `defect` is what is
+        missing in the sum by rounding, `duration` is D. Of loads on a metainterface the unit is that of K2.
 
     Raises
     ------

@@ -17,7 +17,7 @@ from saltus.notebook import html_table
 from saltus.orbits.equations.contract import OrbitEquations, OrbitEvaluation, Solution
 from saltus.orbits.signature import TOLERANCES, Signature
 from saltus.result import Result
-from saltus.systems import System, arguments_of, state_of, with_rates
+from saltus.systems import System, arguments_of, state_of
 
 if TYPE_CHECKING:
     import xarray
@@ -272,7 +272,7 @@ class PeriodicOrbit(Result):
 
     @cached_property
     def multipliers(self) -> np.ndarray:
-        """The Floquet multipliers, by falling modulus, complex (2 degrees of freedom,); one for each coordinate of first order."""
+        """The Floquet multipliers, by falling modulus, complex: two for a coordinate, one for a coordinate of first order."""
         chain = self.solution.evaluation.monodromy()
         if self.equations.following.size and len(chain) == self.system.dimension:
             chain = np.delete(np.delete(chain, self.equations.following, axis=0), self.equations.following, axis=1)
@@ -368,7 +368,7 @@ class PeriodicOrbit(Result):
         """Coordinate and velocity at phase 0 of the load, the stroboscopic section."""
         start = self.start()
         if not start.get("time", 0.0):
-            position, velocity = np.split(with_rates(self.system, 0.0, state_of(self.system, start)), 2)
+            position, velocity = np.split(self.system.with_rates(0.0, state_of(self.system, start)), 2)
             return (float(position[0]), float(velocity[0])) if len(position) == 1 else (position, velocity)
         period = 2.0 * math.pi / self.frequency
         ahead = max(1, math.ceil(start["time"] / period)) * period - start["time"]

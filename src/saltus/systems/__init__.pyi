@@ -1,7 +1,6 @@
 from .contact_model import ContactModel as ContactModel
 from .contact_model import apart as apart
 from .contact_model import constrained_acceleration as constrained_acceleration
-from .contact_model import jumps_of_first_order as jumps_of_first_order
 from .contact_model import mass_and_force as mass_and_force
 from .contact_model import normal_limits as normal_limits
 from .contact_model import reactions as reactions
@@ -65,7 +64,6 @@ from .states import read_starts as read_starts
 from .states import rest_state as rest_state
 from .states import state_of as state_of
 from .states import states_beside as states_beside
-from .states import with_rates as with_rates
 from .states import within_window as within_window
 from .system import System as System
 from .system import check_system as check_system

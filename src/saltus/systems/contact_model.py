@@ -201,8 +201,9 @@ class ContactModel(Model):
        velocity of its coordinate. M(q) may connect no coordinate with a friction to one with a contact;
     5. `surfaces`, a tuple of `Surface`. Then `force` takes a further argument, r(t, q, v, load, sides), and reads `sides.stop`,
        +1 or -1, of the surface "stop";
-    6. optionally `after_impact`, by which the coordinates of first order jump at impacts, `transfers` (whether an impact passes speed on to the other contacts of its group, as a crossing does) and
-       `singularity`, a name for where M(q) has no inverse: a motion that gets there ends with this name as `limit`.
+    6. optionally `after_impact`, by which the coordinates of first order jump at impacts, `transfers` (whether an impact passes
+       speed on to the other contacts of its group, as a crossing does) and `singularity`, a name for where M(q) has no inverse: a
+       motion that gets there ends with this name as `limit`.
 
     Examples
     --------
@@ -372,22 +373,6 @@ def stick_margins(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: 
         force, most = lacking[model.coordinates.index(friction.coordinate)], friction.most * normal
         margins += [most - force, most + force]
     return margins
-
-
-def jumps_of_first_order(model: Any, contact: str, q: Any, v: Any) -> tuple[Any, ...]:
-    """The coordinates of first order after an impact.
-
-    Raises
-    ------
-    ParameterError
-        The model does not give as many as it has.
-    """
-    given, count = model.after_impact(contact, q, v), len(model.first_order)
-    values = tuple(given) if isinstance(given, (tuple, list)) else (given,)
-    if len(values) != count:
-        what = f"{count} value(s), of {', '.join(model.first_order)}"
-        raise ParameterError(f"{type(model).__name__}.after_impact must return {what}, got {given!r}", "model")
-    return values
 
 
 def normal_forces(model: Any, t: Any, q: Any, v: Any, load: Any) -> tuple[Any, ...]:

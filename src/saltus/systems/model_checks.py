@@ -18,7 +18,6 @@ from saltus.systems.contact_model import (
     Contact,
     ContactModel,
     Surface,
-    jumps_of_first_order,
     sides_for,
 )
 from saltus.systems.gap_coordinates import InGapCoordinates
@@ -123,12 +122,14 @@ def _check_first_order(model: Model) -> None:
     kind, names, given = type(model).__name__, model.coordinates, model.first_order
     if isinstance(given, str) or given != names[len(names) - len(given) :]:
         raise ParameterError(
-            f"{kind}.first_order must be a tuple of the last of the coordinates {', '.join(names)}, such as ({names[-1]!r},), got "
-            f"{shown(given)}",
+            f"{kind}.first_order must be a tuple of the last of the coordinates {', '.join(names)}, such as ({names[-1]!r},), "
+            f"got {shown(given)}",
             "model",
         )
     if given and model.sides:
-        raise ParameterError(f"{names[0]} of {kind} is of first order, so it has no velocity with which to hit a contact", "model")
+        raise ParameterError(
+            f"{names[0]} of {kind} is of first order, so it has no velocity with which to hit a contact", "model"
+        )
     jumps = isinstance(model, ContactModel) and model.jumps
     if jumps and not (given and model.contacts):
         what = "no contact" if given else "no coordinate of first order, such as first_order = ('voltage',)"
@@ -139,12 +140,14 @@ def _check_first_order(model: Model) -> None:
         if held and not (isinstance(part, Surface) and len(terms) == 1):
             what = type(part).__name__.lower()
             raise ParameterError(
-                f"the {what} {part.name!r} of {kind} holds {held[0]}, which is of first order and has no velocity that could stop; "
-                "a surface may have one such coordinate alone",
+                f"the {what} {part.name!r} of {kind} holds {held[0]}, which is of first order and has no velocity that could "
+                "stop; a surface may have one such coordinate alone",
                 "model",
             )
     if jumps and isinstance(model, InGapCoordinates) and any(model.sums()[1]):
-        raise ParameterError(f"{kind} has a wall that moves, at which after_impact is not told its velocity: leave it out", "model")
+        raise ParameterError(
+            f"{kind} has a wall that moves, at which after_impact is not told its velocity: leave it out", "model"
+        )
 
 
 def _check_rates(model: Model) -> None:
@@ -164,14 +167,18 @@ def _check_rates(model: Model) -> None:
     if isinstance(model, ContactModel):
         methods = ["force", "normal_forces", *methods] + ["after_impact"] * bool(model.contacts)
     for contact in model.contacts if model.first_order else ():
-        if _asked(model, "after_impact", contact.name, (q,) * size, (v,) * size) is not None:
-            jumps_of_first_order(model, contact.name, (q,) * size, (v,) * size)
+        found, wanted = _asked(model, "after_impact", contact.name, (q,) * size, (v,) * size), size - moving
+        if found is not None and (len(found) if _is_row(found) else 1) != wanted:
+            names = ", ".join(model.first_order)
+            raise ParameterError(
+                f"{type(model).__name__}.after_impact must return {wanted} value(s), of {names}, got {shown(found)}", "model"
+            )
     for method in methods:
         if is_known(method, v) and not is_known(method, math.nan):
             names = " or ".join(model.first_order)
             raise ParameterError(
-                f"{type(model).__name__}.{method} reads the velocity of {names}, which is of first order: its velocity is what the "
-                "model returns for it, so take the terms of that",
+                f"{type(model).__name__}.{method} reads the velocity of {names}, which is of first order: its velocity is what "
+                "the model returns for it, so take the terms of that",
                 "model",
             )
 
@@ -278,15 +285,17 @@ def _check_mass(model: ContactModel) -> None:
     others = [[float(found[i][j]) - (i == j) for j in range(size)] for i in range(moving, size)] if size > 1 else []
     if np.any(others) or (size > moving and size == 1):
         raise ParameterError(
-            f"{kind.__name__}.mass_matrix must have the rows of the unit matrix for {', '.join(model.first_order)}, as coordinates "
-            "of first order have no inertia",
+            f"{kind.__name__}.mass_matrix must have the rows of the unit matrix for {', '.join(model.first_order)}, as "
+            "coordinates of first order have no inertia",
             "model",
         )
     if model.jumps and size > 1:
         other = _asked(model, "mass_matrix", tuple(PROBE[1] / (1 + i) if i < moving else PROBE[2] for i in range(size)))
         if other is None or not np.array_equal(np.array(found, dtype=float), np.array(other, dtype=float)):
             names = ", ".join(model.first_order)
-            raise ParameterError(f"{kind.__name__}.mass_matrix depends on {names}, which jumps at impacts: leave one out", "model")
+            raise ParameterError(
+                f"{kind.__name__}.mass_matrix depends on {names}, which jumps at impacts: leave one out", "model"
+            )
     for i, j in itertools.combinations(range(size), 2):
         a, b = found[i][j], found[j][i]
         if a is b or a == b:  # as they are nearly always

@@ -12,7 +12,6 @@ import numpy as np
 from saltus.checks import LIMITS, as_numbers, check_number
 from saltus.errors import ParameterError, near, shown
 from saltus.systems.gap_coordinates import CLOSED_BELOW, InGapCoordinates
-from saltus.systems.load import DeclaredLoad
 from saltus.systems.model import Model
 from saltus.systems.system import System
 
@@ -24,8 +23,8 @@ def read_start(
 
     Every coordinate must be given, by its name; those called theta_1, theta_2, ... may be given together, `theta=(0.3, 0.0)`. The
     velocity is a number with one coordinate, or as many numbers as there are coordinates; 0, the default, is 0 for all. Those of
-    first order are left out, as their velocities follow from the state. For a
-    system in coordinates of its gaps the coordinates of the model as it was given may be named instead, all of them.
+    first order are left out, as their velocities follow from the state. For a system in coordinates of its gaps the coordinates
+    of the model as it was given may be named instead, all of them.
 
     Parameters
     ----------
@@ -52,17 +51,7 @@ def read_start(
     speeds = _speeds(velocity, system.model)
     for name, value in (*zip(names, positions, strict=True), *(("velocity", speed) for speed in speeds)):
         check_number(name, _plain(value))
-    return with_rates(system, time, np.array([*positions, *speeds], dtype=float))
-
-
-def with_rates(system: System, time: float, state: np.ndarray) -> np.ndarray:
-    """A state (d,), changed in place: the velocities of coordinates of first order are those that follow from it."""
-    model, load = system.model, DeclaredLoad(system.load, system.model)
-    if model.first_order:
-        q, v = (x.item() if x.size == 1 else tuple(x.tolist()) for x in np.split(state, 2))
-        rates = np.atleast_1d(np.array(model.acceleration(time, q, v, 1, load), dtype=float))
-        state[len(state) - len(model.first_order) :] = rates[len(model.moving) :]
-    return state
+    return system.with_rates(time, np.array([*positions, *speeds], dtype=float))
 
 
 def read_starts(
@@ -197,7 +186,7 @@ def check_window(window: Any, system: System) -> Window:
     if window is None:
         return _default_window(system)
     bounds, moving, following = as_numbers(window, "window"), system.model.moving, len(system.model.first_order)
-    if bounds.shape == (2 * len(names) - following, 2):  # velocities that follow from the state may have any bounds
+    if following and bounds.shape == (2 * len(names) - following, 2):  # velocities that follow from the state may have any bounds
         bounds = np.concatenate([bounds, [(-HALF_WIDTH, HALF_WIDTH)] * following])
     single = len(names) == 1
     sound = bounds.shape == (2 * len(names), 2) and (np.abs(bounds) <= LIMITS.value).all()

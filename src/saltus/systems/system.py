@@ -16,7 +16,7 @@ from saltus.notebook import html_table
 from saltus.systems.contact_model import ContactModel, normal_forces
 from saltus.systems.gap_coordinates import in_gap_coordinates
 from saltus.systems.impact_laws import ImpactLaw, VelocityReduction
-from saltus.systems.load import Load
+from saltus.systems.load import DeclaredLoad, Load
 from saltus.systems.model import Model, OneContactModel
 from saltus.systems.model_checks import check_contact, check_works
 from saltus.systems.serial import children, from_dict, is_fixed, numbers, replace, to_dict
@@ -183,6 +183,23 @@ class System:
             return position, velocity
         model: Any = self._in_gaps.model
         return model.gap_states(time, position, velocity, self.load)
+
+    def with_rates(self, time: float, state: np.ndarray) -> np.ndarray:
+        """A state, changed in place, in which the velocities of coordinates of first order are those that follow from it.
+
+        Parameters
+        ----------
+        time
+            The dimensionless time.
+        state
+            Coordinates, then velocities, (d,).
+        """
+        model = self.model
+        if model.first_order:
+            q, v = (x.item() if x.size == 1 else tuple(x.tolist()) for x in np.split(state, 2))
+            rates = np.atleast_1d(np.array(model.acceleration(time, q, v, 1, DeclaredLoad(self.load, model)), dtype=float))
+            state[len(state) - len(model.first_order) :] = rates[len(model.moving) :]
+        return state
 
     def mirrored(self) -> System | None:
         """The system in which -theta(t) is a motion wherever theta(t) is one in this system; None without the symmetry.

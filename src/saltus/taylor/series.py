@@ -29,9 +29,9 @@ class Rows:
     """The places of the coefficients of a motion, and their largest number.
 
     The first roots of the tape are the accelerations, one for each position; of a position in `first_order` its velocity, so that
-    this row of `velocities` is computed and not integrated, and its acceleration has one coefficient less. With `any_order` the function's argument `order` is
-    the highest order of the roots, odd or even; else it is the number of their orders, even and at least that of the orders
-    written out.
+    this row of `velocities` is computed and not integrated, and its acceleration has one coefficient less. With `any_order` the
+    function's argument `order` is the highest order of the roots, odd or even; else it is the number of their orders, even and at
+    least that of the orders written out.
     """
 
     positions: Sequence[Place]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from saltus.checks import LIMITS
-from saltus.errors import ParameterError, SaltusError, TraceError, near
+from saltus.errors import ParameterError, TraceError, near
 from saltus.systems import (
     DeclaredLoad,
     Harmonic,
@@ -15,7 +15,6 @@ from saltus.systems import (
     System,
     apart,
     constrained_acceleration,
-    jumps_of_first_order,
     normal_limits,
     numbers,
     reactions,
@@ -27,6 +26,7 @@ from saltus.taylor.graph import (
     FRICTION,
     POINTWISE,
     Expr,
+    ask,
     combine,
     differentiate,
     loop_count,
@@ -237,28 +237,10 @@ def trace(
     if energy:
         result.margins["kinetic_energy"] = combine("add", ask(model, "kinetic_energy", t, q, v, side, load), 0.0)
     _check(result)
-    _check_rates(result, system.model.coordinates)
     if paths is not None:
         result.append_tangent(paths)
         check_size(result)
     return result
-
-
-def ask(model: Any, method: str, *arguments: Any) -> Any:
-    """Call a model's method; a mistake in a user's own code becomes a sentence that names it.
-
-    Raises
-    ------
-    TraceError
-        The method raised an exception that is not saltus's own; the message has its type and text, and it is the cause.
-    """
-    try:
-        return getattr(model, method)(*arguments)
-    except (SaltusError, KeyboardInterrupt):
-        raise
-    except BaseException as error:  # a user's own code may call exit
-        name = f"{type(model).__name__}.{method}"
-        raise TraceError(f"{name} failed while it was traced: {type(error).__name__}: {error}") from error
 
 
 def _name_records(load: Any) -> None:
@@ -342,8 +324,8 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
     result.mass = [combine("add", entry, 0.0) for row in mass for entry in row]
     result.restitution = [combine("add", entry, 0.0) for row in twin.impact.restitution_matrix(model) for entry in row]
     result.positions = [combine("add", contact.position, 0.0) for contact in contacts]
-    for contact in contacts if result.first_order else ():
-        result.jumps += [combine("add", after, 0.0) for after in jumps_of_first_order(model, contact.name, q, v)]
+    afters = [ask(model, "after_impact", contact.name, q, v) for contact in contacts if result.first_order]
+    result.jumps = [combine("add", x, 0.0) for after in afters for x in (after if isinstance(after, (tuple, list)) else (after,))]
     result.signs = tuple(contact.sign for contact in contacts)
     result.contact_coordinates = tuple(model.coordinates.index(contact.coordinate) for contact in contacts)
     return constrained_acceleration(model, t, q, v, load, [Expr("free", (), i) for i in range(result.dof)], slides)
@@ -368,6 +350,8 @@ def _check(result: Trace) -> None:
     expanded = [*result.acceleration, *result.reactions, *result.margins.values(), *gap]
     check_size(result)
     for node in ordered(expanded):
+        if node.op == "velocity" and node.value in result.first_order_rows:
+            raise TraceError(f"{result.model} reads the velocity of coordinate {node.value + 1}, which is of first order")
         if node.op in POINTWISE:
             where = f"{result.model} uses {node.op} in an acceleration, a gap or a margin"
             raise TraceError(f"{where}; {FRICTION if uses_velocity(*node.args) else BRANCH}")
@@ -376,16 +360,6 @@ def _check(result: Trace) -> None:
             if node.op in ("time", "record", "velocity"):
                 raise TraceError(f"{result.model}.gap may depend on the coordinate, the side and the parameters only")
     _check_abs(result, expanded)
-
-
-def _check_rates(result: Trace, names: tuple[str, ...]) -> None:
-    """Refuse equations that read the velocity of a coordinate of first order, which they are to give."""
-    for node in ordered([*result.acceleration, *result.reactions, *result.contact_numbers] if result.first_order else []):
-        if node.op == "velocity" and node.value in result.first_order_rows:
-            raise TraceError(
-                f"{result.model} reads the velocity of {names[node.value]}, which is of first order: its velocity is what the model "
-                "returns for it, not a part of the state"
-            )
 
 
 def check_size(traced: Trace, lanes: bool = False) -> None:

@@ -384,7 +384,9 @@ def _grid(system: System, velocity: Any, coordinates: Mapping[str, Any], found: 
         given["velocity"] = velocity
     chosen = names[: len(names) - len(system.model.first_order)]  # the velocities of the last ones follow from the state
     if len(chosen) < 2:
-        raise ParameterError(f"{type(system.model).__name__} has the state variable {chosen[0]} alone, and a plane has two", "system")
+        raise ParameterError(
+            f"{type(system.model).__name__} has the state variable {chosen[0]} alone, and a plane has two", "system"
+        )
     for name in given:
         if name not in chosen:
             known = ", ".join(f"{each}=..." for each in chosen)

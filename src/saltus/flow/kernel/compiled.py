@@ -83,8 +83,7 @@ class Structure:
 
     sizes: Sizes
     constant_count: int
-    # The functions that the kernel calls: series, contact_series, reset, contact_damping, tangent; with several contacts series,
-    # matrices, matrix_slopes, tangent.
+    # The functions that the kernel calls, in the order of `OneContactFunctions` or, with several contacts, `ContactsFunctions`.
     functions: tuple[Pointer, ...]
     tables: tuple[Pointer, ...]  # `constants` and `geometry` (with several contacts `matrices`), which the lanes' driver calls
     several: bool
@@ -269,10 +268,9 @@ def _series(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
     targets = [*(("a", i) for i in rows), *gap, *(("m", j) for j in range(len(trace.reactions) + len(trace.margins)))]
     leaves = LEAVES | _free(trace)
     places = Places(("t", "origin", "side", "env", "piece", "q", "v", "a", "g", "m", "w", "order"), leaves)
-    positions, velocities, first_order = [("q", i) for i in rows], [("v", i) for i in rows], trace.first_order_rows
-    layout = Rows(positions, velocities, targets, MOST_COEFFICIENTS, any_order=True, first_order=first_order)
-    motion = tape([*trace.acceleration, *motion_roots(trace)], known, series=True)
-    return _function("series", places, SeriesOf(layout, motion))
+    state = [("q", i) for i in rows], [("v", i) for i in rows]
+    layout = Rows(*state, targets, MOST_COEFFICIENTS, any_order=True, first_order=trace.first_order_rows)
+    return _function("series", places, SeriesOf(layout, tape([*trace.acceleration, *motion_roots(trace)], known, series=True)))
 
 
 def _free(trace: Trace) -> dict[str, tuple[str, int]]:
@@ -290,23 +288,18 @@ def _contact_series(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
     return _function("contact_series", places, SeriesOf(layout, tape([trace.contact_acceleration], known, series=True)))
 
 
-def _moving(trace: Trace) -> dict[str, tuple[str, int]]:
-    """The places of coordinates and velocities in the kernel's state."""
-    return HERE | {"velocity": ("state", len(trace.acceleration))}
-
-
 def _matrices(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
-    """The mass matrix, E, positions of the contacts, jumps of first order, speeds of the grounds at a state, one after the other."""
+    """The numbers that events at contacts need (`Trace.contact_numbers`) at a state, one after the other."""
     roots = trace.contact_numbers
-    places = Places(("env", "piece", "state", "out"), ENV | _moving(trace))
+    places = Places(("env", "piece", "state", "out"), ENV | HERE | {"velocity": ("state", len(trace.acceleration))})
     return _function("matrices", places, [Case(tape(roots, known), [("out", i) for i in range(len(roots))])])
 
 
 def _matrix_slopes(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
     """The derivatives, along each column of the tangent, of the numbers that `matrices` fills; one column after the other."""
-    roots, places = event_derivatives.number_slopes(trace), Places(("env", "piece", "state", "out"), ENV | _moving(trace))
+    roots, leaves = event_derivatives.number_slopes(trace), ENV | HERE | {"velocity": ("state", len(trace.acceleration))}
     cases = [Case(tape(roots, known), [("out", i) for i in range(len(roots))])] if roots else []
-    return _function("matrix_slopes", places, cases)
+    return _function("matrix_slopes", Places(("env", "piece", "state", "out"), leaves), cases)
 
 
 def _at_impact(name: str, arguments: tuple[str, ...], roots: list[Expr], known: dict[Expr, int]) -> WrittenFunction:
