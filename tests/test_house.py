@@ -85,13 +85,15 @@ def behind_the_door(package: str) -> dict[str, str]:
     return {a.name: f"{package}.{node.module}" if node.module else package for node in imports for a in node.names}
 
 
-def statements(path: Path) -> Iterator[ast.stmt]:
+@cache
+def statements(path: Path) -> tuple[ast.Import | ast.ImportFrom, ...]:
     """The import statements of a file, at its top or inside its functions, but not for type checking alone."""
-    tree = ast.parse(path.read_text())
-    for node in ast.walk(tree):
-        if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING":
-            node.body = []
-    return (node for node in ast.walk(tree) if isinstance(node, (ast.Import, ast.ImportFrom)))
+    typing = [
+        node for node in ast.walk(parsed(path)) if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING"
+    ]
+    checked = {id(inner) for node in typing for part in node.body for inner in ast.walk(part)}
+    found = (node for node in ast.walk(parsed(path)) if isinstance(node, (ast.Import, ast.ImportFrom)))
+    return tuple(node for node in found if id(node) not in checked)
 
 
 @cache
@@ -332,6 +334,7 @@ def compiled_arguments() -> Iterator[int]:
             yield from (len(function.args.args) for function in functions)
 
 
+@cache
 def measured() -> dict[str, int]:
     equations = re.compile(r"isinstance\([^)]*(?:Problem|Equations|RestingOrbit)")
     return {
