@@ -214,3 +214,37 @@ def test_between_stops_what_was_asked_for_is_drawn():
         assert label in ax.get_ylabel()
     with pytest.raises(ParameterError, match="quantity must be one of amplitude"):
         draw_sweep(data, "speeds")
+
+
+def test_steps_that_may_be_jumps_are_swept_again_all_at_once(monkeypatch):
+    """Each of both levels takes at most twice 32 ensembles, however many steps there are."""
+    from saltus.studies import swept_parameter
+
+    sizes = []
+
+    def counted(system, states, *given, **named):
+        sizes.append(len(states))
+        return find_recurrence(system, states, *given, **named)
+
+    find_recurrence = swept_parameter.find_recurrence
+    monkeypatch.setattr(swept_parameter, "find_recurrence", counted)
+    grid = np.array([1.02, 1.1, 1.2, 1.3, 1.4])
+    data = saltus.frequency_sweep(oscillator(), grid, x=0.1)
+    alone, together = sizes[: 2 * grid.size], sizes[2 * grid.size :]
+    assert set(alone) == {1}
+    assert together[0] == 2  # a step up and one down
+    assert len(together) <= 2 * 32
+    ((before, after),) = jumps(data, "down")
+    assert 0.5 * (before + after) == pytest.approx(upper_grazing(), abs=2e-4)
+
+
+def test_a_sweep_traces_a_system_of_several_contacts_for_its_proofs_at_most_once(monkeypatch):
+    from saltus.bounds import capture
+
+    traced, traces = capture.trace, []
+    monkeypatch.setattr(capture, "trace", lambda *given: traces.append(0) or traced(*given))
+    load = saltus.Load(frequency=1.0, force=saltus.Harmonic(2.0))
+    stops = saltus.System(model=saltus.TwoStops(damping=0.05), load=load, impact=saltus.NewtonImpact(e=0.7))
+    data = saltus.frequency_sweep(stops, np.linspace(1.0, 1.1, 5), x=0.1, periods=20)
+    assert data.amplitude.shape == (2, 5)
+    assert len(traces) <= 1

@@ -201,7 +201,7 @@ def keeps_rest(system: System, given: Mapping[str, np.ndarray]) -> np.ndarray:
     np.ndarray
         (n,), or (1,) for numbers alone.
     """
-    traced = trace(system)
+    traced, _ = _law_of(system)
     arrays = (given.get(path, np.asarray(value)) for path, value in system.parameters.items())
     columns = np.broadcast_arrays(*map(np.atleast_1d, arrays))
     size = columns[0].size if columns else 1

@@ -14,7 +14,7 @@ import numpy as np
 from saltus.checks import check_axis, check_count, check_number, checked_by
 from saltus.errors import MotionError, ParameterError, shown
 from saltus.flow import Ending, Motion, Recurrence, captured_between, find_recurrence, simulate, state_names
-from saltus.progress import Progress, silent
+from saltus.progress import Progress, part_of, silent
 from saltus.result import provenance
 from saltus.systems import System, arguments_of, check_along, check_path, check_system, read_start
 
@@ -89,13 +89,14 @@ class SweepRequest:
         columns = {self.path: values}
         return captured_between(self.system, columns, columns) if self.stop_early else np.full(len(values), np.nan)
 
-    def end_at_value(self, value: float, captured: float, state: np.ndarray) -> Recurrence:
-        """What becomes of a state at phase 0 at one value of the parameter, with its speed of capture."""
+    def ends(self, system: System, states: np.ndarray, captured: np.ndarray, parameters: Any = None) -> Recurrence:
+        """What becomes of states at phase 0, (n, d), with the speeds of capture, (n,), and parameters of their own."""
         return find_recurrence(
-            self.system.with_({self.path: float(value)}),
-            state[None],
+            system,
+            states,
             self.periods,
-            captured=np.array([captured]),
+            parameters=parameters,
+            captured=captured,
             max_period=self.max_period,
             kept=2 * self.max_period + 2 if self.stop_early else min(self.periods, self.max_period),
             extrema=True,
@@ -103,7 +104,7 @@ class SweepRequest:
             impact_count=True,
             stop_early=self.stop_early,
             tol=self.tol,
-            threads=1,
+            threads=1 if len(states) == 1 else None,
         )
 
     def numbers_of(self, value: float, row: Recurrence) -> list[float]:
@@ -209,14 +210,14 @@ def frequency_sweep(
     )  # fmt: skip
     there, back = DIRECTIONS[:: -1 if asked.falling else 1]
     order = asked.grid[:: -1 if asked.falling else 1]
-    first = _swept(asked, order, asked.start, lambda done: progress(0.5 * done, f"{path} {there}"))
+    first = _swept(asked, order, asked.start, part_of(progress, 0.0, 0.4, f"{path} {there}"))
     reached = len(first.rows)
     if not reached:
         _refuse_start(asked, order[0])
     state = first.rows[-1].last[0] if reached else asked.start
-    second = _swept(asked, order[:reached][::-1], state, lambda done: progress(0.5 + 0.5 * done, f"{path} {back}"))
+    second = _swept(asked, order[:reached][::-1], state, part_of(progress, 0.4, 0.8, f"{path} {back}"))
     runs = {there: first, back: second}
-    jumps = [(name, *jump) for name, run in runs.items() for jump in _jumps(asked, run)]
+    jumps = _jumps(asked, runs, part_of(progress, 0.8, 1.0))
     progress(1.0, "done")
     return _dataset(asked, (runs["up"], runs["down"]), jumps)
 
@@ -243,17 +244,17 @@ class _OneWay:
         return np.array([amplitude_of(row) for row in self.rows])
 
 
-def amplitude_of(row: Recurrence) -> float:
-    """The largest absolute value of the first coordinate in a motion's period."""
-    return float(max(abs(row.highest[0]), abs(row.lowest[0])))
+def amplitude_of(rows: Recurrence, i: int = 0) -> float:
+    """The largest absolute value of the coordinates in the period of one of the motions."""
+    return float(max(abs(rows.highest[i]), abs(rows.lowest[i])))
 
 
-def _swept(asked: SweepRequest, values: np.ndarray, state: np.ndarray, progress: Any) -> _OneWay:
+def _swept(asked: SweepRequest, values: np.ndarray, state: np.ndarray, progress: Progress) -> _OneWay:
     """Follow the motion from value to value, until a margin ends it."""
     run = _OneWay(values, state, [], [])
     for i, (value, captured) in enumerate(zip(values, asked.proved_speeds(values), strict=True)):
-        progress(i / len(values))
-        row = asked.end_at_value(value, captured, state)
+        progress(i / len(values), "")
+        row = asked.ends(asked.system.with_({asked.path: float(value)}), state[None], np.array([captured]))
         if row.ended[0]:
             break
         run.rows.append(row)
@@ -262,34 +263,64 @@ def _swept(asked: SweepRequest, values: np.ndarray, state: np.ndarray, progress:
     return replace(run, values=values[: len(run.rows)])
 
 
-def _jumps(asked: SweepRequest, run: _OneWay) -> list[tuple[float, ...]]:
-    """Values before and after each jump of one direction, and the amplitudes there."""
-    sizes = run.amplitude
-    found: list[tuple[float, ...]] = []
-    for i in _candidates(run):
-        jump, step = _located(asked, run, i), abs(sizes[i + 1] - sizes[i])
-        if abs(jump[3] - jump[2]) >= max(SETTINGS.kept * step, SETTINGS.least_step * sizes.max()):
-            found.append(jump)
-    return found
+@dataclass
+class _Step:
+    """A step of one direction, of which the part is looked for in which a slower sweep makes the change of amplitude."""
+
+    direction: str
+    first: float
+    last: float  # the values at its ends
+    before: float
+    after: float  # the amplitudes there
+    low: float  # the value to which the slower sweep has come, with the amplitude and the state there
+    size: float
+    state: np.ndarray
+    found: tuple[float, ...]  # the values before and after the change, and the amplitudes there
+    ended: bool = False  # whether a margin has ended the slower sweep
+
+    def goes_on(self, value: float, rows: Recurrence, i: int) -> bool:
+        """Take the motion at the next value; returns whether the change is still to come."""
+        size, self.ended = amplitude_of(rows, i), bool(rows.ended[i])
+        if self.ended:
+            return False
+        if abs(size - self.after) < abs(size - self.size):
+            self.found = (self.low, value, self.size, size)
+            return False
+        self.low, self.size, self.state = value, size, rows.last[i]
+        return True
 
 
-def _located(asked: SweepRequest, run: _OneWay, i: int) -> tuple[float, float, float, float]:
-    """The part of step i in which a slower sweep makes the change of amplitude, with the amplitudes at the ends of this part."""
-    first, last = (float(value) for value in run.values[i : i + 2])
-    a, b = (amplitude_of(row) for row in run.rows[i : i + 2])
-    found, low, state = (first, last, a, b), first, run.rows[i].last[0]
-    for parts in SETTINGS.parts if asked.stop_early else ():
-        inner = _parts(low, last, (last - first) / parts)
-        for here, captured in zip(inner, asked.proved_speeds(np.array(inner)), strict=True):
-            row = asked.end_at_value(here, captured, state)
-            if row.ended[0]:
-                return found
-            size = amplitude_of(row)
-            if abs(size - b) < abs(size - a):
-                found = (low, here, a, size)
-                break
-            low, a, state = here, size, row.last[0]
-    return found
+def _jumps(asked: SweepRequest, runs: Mapping[str, _OneWay], progress: Progress) -> list[tuple[Any, ...]]:
+    """The direction of each jump, the values before and after it, and the amplitudes there."""
+    steps, least = list[_Step](), dict[str, float]()
+    for name, run in runs.items():
+        least[name] = SETTINGS.least_step * run.amplitude.max(initial=0.0)
+        for i in _candidates(run):
+            (first, last), (a, b) = run.values[i : i + 2].tolist(), run.amplitude[i : i + 2].tolist()
+            steps.append(_Step(name, first, last, a, b, first, a, run.rows[i].last[0], (first, last, a, b)))
+    levels = SETTINGS.parts if asked.stop_early else ()
+    for k, parts in enumerate(levels):
+        _sweep_parts(asked, steps, parts, part_of(progress, k / len(levels), (k + 1) / len(levels)))
+    sizes = [(step, abs(step.found[3] - step.found[2]), SETTINGS.kept * abs(step.after - step.before)) for step in steps]
+    return [(step.direction, *step.found) for step, size, kept in sizes if size >= max(kept, least[step.direction])]
+
+
+def _sweep_parts(asked: SweepRequest, steps: list[_Step], parts: int, progress: Progress) -> None:
+    """Sweep steps again in so many parts, all of them at once, each up to its change of amplitude."""
+    ways = [(step, _parts(step.low, step.last, (step.last - step.first) / parts)) for step in steps if not step.ended]
+    ways = [(step, inner) for step, inner in ways if inner]
+    if not ways:
+        return
+    proved = iter(asked.proved_speeds(np.array([value for _, inner in ways for value in inner])))
+    going = [(step, [(value, next(proved)) for value in inner]) for step, inner in ways]
+    for k in range(max(len(inner) for _, inner in going)):
+        progress(k / parts, f"{asked.path} in smaller steps, {len(going)} at once")
+        values, captured = np.array([inner[k] for _, inner in going]).T
+        rows = asked.ends(asked.system, np.array([step.state for step, _ in going]), captured, {asked.path: values})
+        here = zip(going, values.tolist(), range(len(going)), strict=True)
+        going = [(step, inner) for (step, inner), value, i in here if step.goes_on(value, rows, i) and k + 1 < len(inner)]
+        if not going:
+            return
 
 
 def _parts(low: float, last: float, step: float) -> list[float]:
