@@ -75,7 +75,8 @@ def free_pulls(motion, t):
     for i in range(motion.contacts.shape[0]):
         a = motion.acceleration_series[motion.contacts[i, ContactColumn.COORDINATE]]
         motion.pulls[i] = motion.signs[i] * a[0]
-        change = max(change, abs(a[1] / a[0]) if a[0] != 0.0 else np.inf)
+        if a[1] != 0.0:  # bodies that fall together do not press on one another, and go on so
+            change = max(change, abs(a[1] / a[0]) if a[0] != 0.0 else np.inf)
     return 1.0 + change
 
 
@@ -103,6 +104,14 @@ def end_accumulation_of(motion, t):
         near = smaller_set(motion, near)
         again = frozen_accumulation(motion, near, limit) if near > 0 else -1.0
         left = again if again >= 0.0 else left + again
+    slow = slow_impacts(tol)
+    while left < 0.0 and slow >= slowest:  # on ever smaller scales, as of bodies that collapse beside others that still move
+        slow *= 1e-3
+        slower = near_contacts(motion, slow)
+        if slower != near and slower > 0:
+            near = slower
+            again = frozen_accumulation(motion, near, limit)
+            left = again if again >= 0.0 else left + again
     for i in range(count):
         moving |= (1 << i) if near >> i & 1 and motion.rates[i] != 0.0 else 0
     if left < 0.0:
