@@ -131,6 +131,23 @@ def test_orbits_of_a_soft_stop_are_found_and_followed():
     assert abs(saltus.energies(orbit).defect) < 1e-12
 
 
+def test_a_branch_goes_on_where_crossings_appear_beside_its_section():
+    """With the section there no step would lead on: the new crossings are nearer to it than orbits may have events."""
+    near = {"x": -0.959, "y": -0.762, "velocity": (-1.372, 0.459)}
+    orbit = saltus.find_orbit(SOFT.with_({"load.frequency": 1.00074}), **near, settle=0, period=1)
+    branch = saltus.continue_orbit(orbit, "load.frequency", (1.0, 1.0008))
+    assert [str(end.reason.code) for end in branch.ends] == ["bound", "bound"]
+    assert sorted(str(point.kind) for point in branch.special) == ["LP", "NS", "SW", "SW"]
+    assert max(point.defect for point in branch.special) < 1e-10
+    for kind, measured in (
+        ("LP", lambda values: np.abs(values - 1.0).min()),
+        ("NS", lambda values: np.abs(np.abs(values) - 1).min()),
+    ):
+        (point,) = [each for each in branch.special if each.kind == kind]
+        tangent = sensitivities(point.orbit.system, **point.orbit.start(), periods=1)
+        assert measured(np.linalg.eigvals(tangent.state)) < 1e-6
+
+
 @dataclass(frozen=True, kw_only=True)
 class Backlash(ContactModel):
     """Two equal masses whose spring acts where abs(y - x) > b: r'' = -2 k (r -+ b) there, and r'' = 0 between."""

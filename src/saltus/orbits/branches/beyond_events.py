@@ -199,11 +199,11 @@ def other_events(point: OrbitPoint, sequence: Events | None, points: Sequence[Or
         sides.append((beside, tangent))
         for probe, direction in product(SETTINGS.probes, (tangent, -tangent)):
             if (ahead := solved(point.place + probe * direction, direction, probe)) is not None:
-                return ahead
+                return _clear_of_section(ahead)
     for (beside, tangent), probe, sign in product(sides[:2], SETTINGS.steep_probes, (1.0, -1.0)):
         place = _just_beyond(point, point.place + sign * probe * tangent, beside - point.place, probe)
         if place is not None and (ahead := solved(place, sign * tangent, probe)) is not None:
-            return ahead
+            return _clear_of_section(ahead)
     return End(reason, point.parameter, detail=detail)
 
 
@@ -320,6 +320,12 @@ def _section_comes(point: OrbitPoint) -> bool:
     """Whether a zero of `same_events` only means that an event has come to the section."""
     found = events_at(point)
     return found.section_distance - EVENTS.section_distance < min(found.distance, EVENTS.section_distance)
+
+
+def _clear_of_section(ahead: OrbitPoint) -> OrbitPoint:
+    """The first point beyond a change, at another section if an event has appeared too near to its own."""
+    near = events_at(ahead).section_distance < EVENTS.section_distance
+    return (_from_another_section(ahead) if near else None) or ahead
 
 
 def _from_another_section(point: OrbitPoint) -> OrbitPoint | None:
