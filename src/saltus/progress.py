@@ -8,11 +8,15 @@ from __future__ import annotations
 
 import html
 import io
+import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from numbers import Real
 from typing import Any
 
-from saltus.checks import check_number
+from saltus.errors import ParameterError, shown
 
 Progress = Callable[[float, str], object]
 LOOK_INTERVAL = 0.1  # seconds between looks at Ctrl-C, and at the progress of other threads
@@ -70,12 +74,45 @@ def show_progress(fraction: float, what: str) -> None:
     --------
     >>> ends = saltus.simulate_many(system, theta=[0.1, 0.3], periods=10, progress=saltus.show_progress)
     """
-    check_number("fraction", fraction)
+    if not isinstance(fraction, Real) or isinstance(fraction, bool) or not math.isfinite(fraction):
+        raise ParameterError(f"fraction must be a finite number, got {shown(fraction)}", "fraction")
     if LINE.show(min(max(fraction, 0.0), 1.0), what):
         return
     bar = "#" * round(20 * min(max(fraction, 0.0), 1.0))
     done = fraction >= 1.0
     print(f"\r[{bar:<20}] {100 * fraction:3.0f} % {what:<40.40}", end="\n" if done else "", file=sys.stderr, flush=True)
+
+
+class Watch:
+    """A progress that remembers the fraction, for parts of the work that know nothing of the whole."""
+
+    def __init__(self, progress: Progress) -> None:
+        self.progress, self.fraction = progress, 0.0
+
+    def __call__(self, fraction: float, what: str) -> object:
+        self.fraction = fraction
+        return self.progress(fraction, what)
+
+
+_watch: ContextVar[Watch | None] = ContextVar("watch", default=None)
+
+
+@contextmanager
+def watched(progress: Progress) -> Iterator[Watch]:
+    """While work goes on, `say` tells this progress; work is given the one that is returned in its place."""
+    watch = Watch(progress)
+    token = _watch.set(watch)
+    try:
+        yield watch
+    finally:
+        _watch.reset(token)
+
+
+def say(what: str) -> None:
+    """Tell whoever watches the work of this thread what takes a while now, such as compiling, whichever function asked for it."""
+    watch = _watch.get()
+    if watch is not None:
+        watch.progress(watch.fraction, what)
 
 
 def part_of(progress: Progress, begin: float, end: float, what: str | None = None) -> Progress:

@@ -26,6 +26,7 @@ from saltus.systems import Record, System, children, is_number
 from saltus.taylor import graph, load_tables, memory, numba_types, rules, series, vectors
 from saltus.taylor.cache import digest, kept_bytes, loading, source_of
 from saltus.taylor.graph import LEAVES, Expr
+from saltus.taylor.kernels import told_before
 from saltus.taylor.memory import Memory, Place, Places, Tape, tape
 from saltus.taylor.numba_types import Pointer, given_arguments, result_count, written_function, written_type
 from saltus.taylor.rules import FUNCTIONS
@@ -178,12 +179,12 @@ def llvm_text(functions: Sequence[WrittenFunction]) -> str:
     return str(module)
 
 
-def load_functions(kind: str, functions: Sequence[WrittenFunction]) -> dict[str, Pointer]:
-    """Pointers to functions by their names: loaded from the disk, or written and compiled first."""
+def load_functions(kind: str, functions: Sequence[WrittenFunction], traced: Trace) -> dict[str, Pointer]:
+    """Pointers to functions of a trace by their names: loaded from the disk, or written and compiled first."""
     name = f"{kind}_{digest(functions_text(functions), written_by())}"
     with loading:  # a second thread must not load them again: the code that is replaced would be freed while pointers lead to it
         if name not in _loaded:
-            code = kept_bytes(f"{name}.o", lambda: object_code(llvm_text(functions)))
+            code = kept_bytes(f"{name}.o", lambda: object_code(told_before(traced, kind, llvm_text(functions))))
             _loaded[name] = Loaded(code, [function.name for function in functions])
     addresses = _loaded[name].addresses
     return {each.name: Pointer.to(addresses[each.name], written_type(each.signature)) for each in functions}

@@ -21,6 +21,8 @@ from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
+from saltus.checks import LIMITS
+from saltus.progress import say
 from saltus.taylor import numba_types, private_numba
 from saltus.taylor.cache import alone, cache_directory, digest, loading, source_of, undamaged, with_digest, write
 
@@ -101,8 +103,20 @@ def _loaded(name: str, text: str) -> ModuleType:
                 if path.exists():
                     log.warning("%s is damaged; it is written again", path)
                 write(path, text.encode())
+            if not is_compiled(name):
+                kind = name.removeprefix("saltus_").rpartition("_")[0]
+                say(f"compiling the kernel {kind!r}, once for all models (up to half a minute)")
             _execute(name, path, text)
     return sys.modules[name]
+
+
+def told_before(traced: Any, kind: str, text: str) -> str:
+    """LLVM's text of a trace, which is said to be compiled if that takes more than a moment."""
+    seconds, columns = len(text) / LIMITS.letters, "the sensitivities of " * bool(traced.columns)
+    if seconds > LIMITS.unsaid:
+        model = f"{traced.model}, a model of {traced.dof} coordinate{'s' * (traced.dof > 1)}"
+        say(f"compiling {'ensembles of ' * (kind == 'lane')}{columns}{model} (some {seconds:.0f} s, once)")
+    return text
 
 
 def _holds(path: Path, text: str) -> bool:

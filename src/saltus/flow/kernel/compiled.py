@@ -178,7 +178,7 @@ def kernel_text(*modules: ModuleType) -> str:
 
 def load_structure(trace: Trace) -> Structure:
     """The functions of a trace's structure."""
-    made = load_functions("structure", structure_functions(trace))
+    made = load_functions("structure", structure_functions(trace), trace)
     several = ("series", "matrices", "matrix_slopes", "tangent")
     names = several if trace.several else ("series", "contact_series", "reset", "contact_damping", "tangent")
     stops, steep = len(trace.reactions) + len(trace.margins), int(is_steep(trace.acceleration))

@@ -134,7 +134,7 @@ def load_lane_functions(trace: Trace) -> tuple[MemoryPlan, tuple[Any, ...]]:
         Compiling them would take minutes.
     """
     check_size(trace, lanes=True)
-    return memory_plan(trace), tuple(load_functions("lane", lane_functions(trace)).values())
+    return memory_plan(trace), tuple(load_functions("lane", lane_functions(trace), trace).values())
 
 
 @cache

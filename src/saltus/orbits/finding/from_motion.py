@@ -27,6 +27,7 @@ from saltus.orbits.equations.kinds import KINDS, equations_of
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
 from saltus.orbits.verify import same_orbit
+from saltus.progress import Progress, silent
 from saltus.systems import (
     System,
     arguments_of,
@@ -62,6 +63,7 @@ def find_orbit(
     settle: int | None = None,
     max_period: int = SETTINGS.max_period,
     parameters: tuple[str, ...] = (),
+    progress: Progress = silent,
     **coordinates: float,
 ) -> PeriodicOrbit:
     """The periodic orbit on which a motion settles, or, with settle=0, the one that lies near it, stable or not.
@@ -83,6 +85,8 @@ def find_orbit(
         The longest period that is looked for.
     parameters
         Dotted paths along which the orbit will be continued; not needed for `continue_orbit`, which adds its own.
+    progress
+        Called from time to time with the fraction done and what is being done.
 
     Raises
     ------
@@ -98,18 +102,20 @@ def find_orbit(
     """
     counts = {"period": period, "max_period": max_period, "settle": settle}
     _check(system, parameters, counts)
-    state = arguments_of(system, read_start(system, velocity, coordinates, ("parameters", *counts)))
+    state = arguments_of(system, read_start(system, velocity, coordinates, ("parameters", "progress", *counts)))
+    progress(0.0, "following the motion")
     base = equations_of(system, Signature((), 1), tuple(parameters))  # refuses systems that have no orbits
     if settle is not None:
         state = _after(system, state, settle)
-        return _polish(base, state, _period_of(system, state, period, max_period), None)
+        return _polish(base, state, _period_of(system, state, period, max_period), None, progress)
     passed = 0
     for attempt in range(SETTINGS.rounds):
+        progress(passed / sum(SETTINGS.settling * 2**k for k in range(SETTINGS.rounds)), "following the motion until it settles")
         state = _after(system, state, wait := SETTINGS.settling * 2**attempt)
         passed += wait
         q = _returning(system, state, period, max_period)
         if q is not None:
-            return _polish(base, state, q, passed)
+            return _polish(base, state, q, passed, progress)
     raise MotionError(
         f"the motion has not settled on a periodic orbit of up to {period or max_period} forcing periods after {passed}: it is "
         "chaotic, slow to settle or longer; try another start, max_period=..., or settle=0 with period=... for an unstable orbit "
@@ -185,10 +191,12 @@ def _period_of(system: System, state: dict[str, Any], period: int | None, max_pe
     return nearest_return(_stroboscopic_states(system, state, max_period)[::-1], max_period)
 
 
-def _polish(base: OrbitEquations, state: dict[str, Any], periods: int, passed: int | None) -> PeriodicOrbit:
+def _polish(base: OrbitEquations, state: dict[str, Any], periods: int, passed: int | None, progress: Progress) -> PeriodicOrbit:
     """Solve for the orbit near a motion over one of its periods."""
+    progress(0.99, "solving for the orbit")
     orbit = orbit_from(base, state, periods)
     if orbit is not None and orbit.admissible:
+        progress(1.0, "done")
         return orbit
     when = "from the start" if passed is None else f"after {passed} forcing periods"
     raise MotionError(
