@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from saltus.checks import check_states
+from saltus.errors import ParameterError
 from saltus.systems.cell_chain import CellChain
 from saltus.systems.metainterface import Metainterface
 from saltus.systems.model import Model
@@ -80,6 +81,11 @@ def drawing_of(system: System, position: Any) -> tuple[Shape, ...]:
     own: Any = getattr(model, "drawing", None)
     if own is not None:
         return tuple(own(place))
+    if not model.moving:
+        names = ", ".join(model.coordinates)
+        raise ParameterError(
+            f"{type(model).__name__} has {names} of first order, which move nothing: give it a `drawing`", "system"
+        )
     draw = next((draw for kind, draw in DRAWN.items() if isinstance(model, kind)), _masses)
     return tuple(draw(model, place))
 
@@ -211,9 +217,9 @@ def _chain(model: CellChain, place: np.ndarray) -> list[Shape]:
 
 
 def _masses(model: Model, place: np.ndarray) -> list[Shape]:
-    """A mass on a line of its own for each coordinate, above a mark at 0."""
+    """A mass on a line of its own for each coordinate that is not of first order, above a mark at 0."""
     shapes: list[Shape] = []
-    for i, x in enumerate(place.tolist()):
+    for i, x in enumerate(place[: len(model.moving)].tolist()):
         y = -0.8 * i
         shapes += [
             _line("ground", (-2.0, y), (2.0, y)),

@@ -404,9 +404,10 @@ def check_system(
             f"{', '.join(inner.model.coordinates)}",
             "system",
         )
-    if coordinates is not None and len(names) != coordinates:
+    if coordinates is not None and (len(names) != coordinates or system.model.first_order):
         wanted = "one coordinate" if coordinates == 1 else f"{coordinates} coordinates"
-        raise ParameterError(f"{asking} is for models with {wanted}, and this one has {', '.join(names)}", "system")
+        what = ", ".join(names) + " of first order" * (len(names) == coordinates)
+        raise ParameterError(f"{asking} is for models with {wanted}, and this one has {what}", "system")
     if system.model.holds_coordinates and not several_contacts:
         model = system.model
         parts = ", ".join(
