@@ -368,7 +368,7 @@ class PeriodicOrbit(Result):
         """Coordinate and velocity at phase 0 of the load, the stroboscopic section."""
         start = self.start()
         if not start.get("time", 0.0):
-            position, velocity = np.split(self.system.with_rates(0.0, state_of(self.system, start)), 2)
+            position, velocity = np.split(self.system._with_rates(0.0, state_of(self.system, start)), 2)
             return (float(position[0]), float(velocity[0])) if len(position) == 1 else (position, velocity)
         period = 2.0 * math.pi / self.frequency
         ahead = max(1, math.ceil(start["time"] / period)) * period - start["time"]

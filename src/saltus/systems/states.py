@@ -51,7 +51,7 @@ def read_start(
     speeds = _speeds(velocity, system.model)
     for name, value in (*zip(names, positions, strict=True), *(("velocity", speed) for speed in speeds)):
         check_number(name, _plain(value))
-    return system.with_rates(time, np.array([*positions, *speeds], dtype=float))
+    return system._with_rates(time, np.array([*positions, *speeds], dtype=float))
 
 
 def read_starts(

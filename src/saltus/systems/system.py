@@ -184,16 +184,8 @@ class System:
         model: Any = self._in_gaps.model
         return model.gap_states(time, position, velocity, self.load)
 
-    def with_rates(self, time: float, state: np.ndarray) -> np.ndarray:
-        """A state, changed in place, in which the velocities of coordinates of first order are those that follow from it.
-
-        Parameters
-        ----------
-        time
-            The dimensionless time.
-        state
-            Coordinates, then velocities, (d,).
-        """
+    def _with_rates(self, time: float, state: np.ndarray) -> np.ndarray:
+        """A state (d,), changed in place: the velocities of coordinates of first order are those that follow from it at a time."""
         model = self.model
         if model.first_order:
             q, v = (x.item() if x.size == 1 else tuple(x.tolist()) for x in np.split(state, 2))
