@@ -273,9 +273,7 @@ class PeriodicOrbit(Result):
     @cached_property
     def multipliers(self) -> np.ndarray:
         """The Floquet multipliers, by falling modulus, complex: two for a coordinate, one for a coordinate of first order."""
-        chain = self.solution.evaluation.monodromy()
-        if self.equations.following.size and len(chain) == self.system.dimension:
-            chain = np.delete(np.delete(chain, self.equations.following, axis=0), self.equations.following, axis=1)
+        chain = self.equations.monodromy(self.solution.evaluation)
         if not np.isfinite(chain).all():
             return np.full(len(chain), complex(np.inf))
         values = np.linalg.eigvals(chain).astype(complex)

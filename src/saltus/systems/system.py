@@ -185,7 +185,7 @@ class System:
         return model.gap_states(time, position, velocity, self.load)
 
     def _with_rates(self, time: float, state: np.ndarray) -> np.ndarray:
-        """A state (d,), changed in place: the velocities of coordinates of first order are those that follow from it at a time."""
+        """A state (d,), changed in place: velocities of coordinates of first order are those that follow from it at a time."""
         model = self.model
         if model.first_order:
             q, v = (x.item() if x.size == 1 else tuple(x.tolist()) for x in np.split(state, 2))

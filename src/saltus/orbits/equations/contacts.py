@@ -126,6 +126,9 @@ class ContactsEquations(OrbitEquations):
     def size(self) -> int:
         return len(self._free) + len(self.signature.events)
 
+    def monodromy(self, evaluation: OrbitEvaluation) -> np.ndarray:
+        return evaluation.monodromy()  # what follows from the others is no unknown
+
     def split(self, unknowns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The state at the start, with 0 for coordinates and velocities that are held, and the phases of the events."""
         state = np.zeros(2 * self.own)

@@ -356,6 +356,11 @@ class OrbitEquations(ABC):
         are 0, and the equations have no other derivatives to them."""
         return np.arange(2 * self.own - len(self.system.model.first_order), 2 * self.own)
 
+    def monodromy(self, evaluation: OrbitEvaluation) -> np.ndarray:
+        """The derivative of the map over a (half) period, without the unknowns that follow from the others."""
+        chain = evaluation.monodromy()
+        return np.delete(np.delete(chain, self.following, axis=0), self.following, axis=1) if self.following.size else chain
+
     @property
     def margins(self) -> tuple[str, ...]:
         """The model's margins, in the order of `extremes`."""
