@@ -273,7 +273,8 @@ class PeriodicOrbit(Result):
     @cached_property
     def multipliers(self) -> np.ndarray:
         """The Floquet multipliers, by falling modulus, complex: two for a coordinate, one for a coordinate of first order."""
-        chain = self.equations.monodromy(self.solution.evaluation)
+        chain, following = self.solution.evaluation.monodromy(), self.equations.following
+        chain = np.delete(np.delete(chain, following, axis=0), following, axis=1)
         if not np.isfinite(chain).all():
             return np.full(len(chain), complex(np.inf))
         values = np.linalg.eigvals(chain).astype(complex)
@@ -359,7 +360,7 @@ class PeriodicOrbit(Result):
         check_count("rounds", rounds, 1, LIMITS.periods // self.period)
         start, motion = self.start(), self.motion(rounds * self.period)
         apart = np.subtract(motion.final_state, state_of(self.system, start))
-        return float(np.abs(np.delete(apart, self.equations.following)).max())
+        return float(np.abs(apart[: len(apart) - len(self.system.model.first_order)]).max())
 
     @cached_property
     def state(self) -> tuple[Any, Any]:

@@ -120,14 +120,16 @@ class ContactsEquations(OrbitEquations):
             if self.plan[0, SegmentPlan.ALONG] >> i & 1
         }
         free = [i for i in range(self.own) if i not in held]
-        return np.setdiff1d([*free, *(self.own + i for i in free)], self.following).astype(int)
+        moving = [i for i in free if i < self.own - len(self.system.model.first_order)]
+        return np.array([*free, *(self.own + i for i in moving)], dtype=int)
 
     @property
     def size(self) -> int:
         return len(self._free) + len(self.signature.events)
 
-    def monodromy(self, evaluation: OrbitEvaluation) -> np.ndarray:
-        return evaluation.monodromy()  # what follows from the others is no unknown
+    @cached_property
+    def following(self) -> np.ndarray:
+        return np.zeros(0, dtype=int)  # they are no unknowns
 
     def split(self, unknowns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The state at the start, with 0 for coordinates and velocities that are held, and the phases of the events."""

@@ -352,14 +352,8 @@ class OrbitEquations(ABC):
 
     @cached_property
     def following(self) -> np.ndarray:
-        """The places in a state of the velocities of coordinates of first order, which follow from the others: as unknowns they
-        are 0, and the equations have no other derivatives to them."""
+        """The places of unknowns that follow from the others, the velocities of coordinates of first order; they are 0."""
         return np.arange(2 * self.own - len(self.system.model.first_order), 2 * self.own)
-
-    def monodromy(self, evaluation: OrbitEvaluation) -> np.ndarray:
-        """The derivative of the map over a (half) period, without the unknowns that follow from the others."""
-        chain = evaluation.monodromy()
-        return np.delete(np.delete(chain, self.following, axis=0), self.following, axis=1) if self.following.size else chain
 
     @property
     def margins(self) -> tuple[str, ...]:
