@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -105,3 +106,30 @@ def test_what_is_of_one_plane_or_drawn_refuses() -> None:
     with pytest.raises(saltus.ParameterError, match="coordinates of first order"):
         saltus.page(shaken(Piezo()), x=0.0, voltage=0.0)
     assert len(saltus.systems.drawing_of(shaken(Piezo()), [0.1, 5.0])) == 3
+
+
+def test_a_rectifier_conducts_beyond_a_surface_of_the_voltage() -> None:
+    @dataclass(frozen=True, kw_only=True)
+    class Rectified(Piezo):
+        surfaces = (saltus.Surface(name="diode", coordinate="voltage", position=0.12),)
+
+        def force(self, t: Any, theta: Any, velocity: Any, load: Any, sides: Any) -> Any:
+            push, rate = super().force(t, theta, velocity, load)
+            return push, rate - (1.0 + sides.diode) * (theta[1] - 0.12)
+
+    system = shaken(Rectified())
+    orbit = saltus.find_orbit(system, x=0.0, voltage=0.0)
+    kinds = [event.kind.value for event in orbit.motion().events]
+    assert sorted(kinds) == ["crossing", "crossing", "impact"]
+    assert orbit.defect < 1e-12
+    start = orbit.start()
+    found = saltus.sensitivities(system, **start, periods=1).state[:3, :3]
+    exact = np.linalg.eigvals(found)
+    assert np.sort_complex(orbit.multipliers) == pytest.approx(np.sort_complex(exact), abs=1e-9)
+    step, moved = 1e-6, []
+    for name in ("x", "voltage", "velocity"):
+        ends = [saltus.simulate(system, **start | {name: start[name] + h}, periods=1).final_state for h in (step, -step)]
+        moved.append((ends[0] - ends[1])[:3] / (2.0 * step))
+    assert np.transpose(moved) == pytest.approx(found, abs=1e-7)
+    branch = saltus.continue_orbit(orbit, "load.frequency", (1.04, 1.06))
+    assert len(branch.orbits) > 2

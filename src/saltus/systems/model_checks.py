@@ -48,7 +48,8 @@ def check_works(model: Model) -> bool:
     sums = False
     if type(model) not in _known:
         _check_class(type(model))
-    _check_first_order(model)
+    if model.first_order or type(model) not in _known:
+        _check_first_order(model)
     if isinstance(model, OneContactModel):
         check_one_contact(model)
     if isinstance(model, ContactModel):
