@@ -9,7 +9,7 @@ import numpy as np
 
 import saltus
 
-model = saltus.FourCells(beta0=np.deg2rad(80), coupling=0.5, mass_ratio=0.2, damping=0.05)
+model = saltus.CellChain(beta0=np.deg2rad(80), cells=4, coupling=0.5, mass_ratio=0.2, damping=0.05)
 system = saltus.System(model=model, load=saltus.Load(vertical=-0.1), impact=saltus.NewtonImpact(e=0.3))
 start = dict.fromkeys(model.coordinates, 0.0) | {"lower_1": 0.5}
 motion = saltus.simulate(system, **start, velocity=(0.0,) * 8, duration=60)

@@ -85,9 +85,7 @@ from .systems import VelocityReduction as VelocityReduction
 from .systems import WallOscillator as WallOscillator
 from .systems import energy_gain as energy_gain
 from .systems import register as register
-from .systems.cell_chain import FourCells as FourCells
-from .systems.cell_chain import ThreeCells as ThreeCells
-from .systems.cell_chain import TwoCells as TwoCells
+from .systems.cell_chain import CellChain as CellChain
 from .systems.contact_model import Contact as Contact
 from .systems.contact_model import Friction as Friction
 from .systems.contact_model import Surface as Surface

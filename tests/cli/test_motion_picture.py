@@ -67,7 +67,7 @@ def test_a_motion_of_no_length_can_be_drawn():
 
 
 def test_every_coordinate_of_a_chain_is_drawn_with_a_line_of_its_own():
-    model = saltus.FourCells(beta0=1.4, mass_ratio=0.2)
+    model = saltus.CellChain(cells=4, beta0=1.4, mass_ratio=0.2)
     system = saltus.System(model=model, load=saltus.Load(frequency=1.0, vertical=-0.5))
     start = dict.fromkeys(model.coordinates, 0.0) | {"lower_1": 0.2}
     figure = figure_of(draw_motion(saltus.simulate(system, **start, velocity=(0.0,) * 8, periods=2).to_xarray()))

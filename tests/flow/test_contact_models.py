@@ -1,14 +1,16 @@
 """The models with several contacts that come with saltus: the impact pair, and chains of cells."""
 
 import math
+import pickle
 
 import numpy as np
 import pytest
 
 import saltus
-from saltus import Contact, FourCells, ImpactPair, NewtonImpact, ThreeCells, TwoCells, TwoLayer, TwoStops
+from saltus import CellChain, Contact, ContactModel, ImpactPair, NewtonImpact, TwoLayer, TwoStops
 from saltus.errors import ParameterError
 from saltus.flow import EventKind
+from saltus.flow.contacts.complementarity import acting, by_exchange
 from saltus.systems import Harmonic, Load, System, VelocityReduction, energy_gain
 
 COSINE = math.pi / 2  # the phase of a harmonic that makes it one
@@ -64,10 +66,10 @@ def test_stops_that_leave_no_room_are_refused():
         TwoStops(left=1.0)
 
 
-def chain(kind, *, impact=None, **numbers):
+def chain(cells, *, impact=None, **numbers):
     numbers = {"beta0": BETA80, "coupling": 0.3, "mass_ratio": 0.5, "damping": 0.05} | numbers
     load = Load(frequency=1.1, vertical=-0.4, horizontal=Harmonic(amplitude=0.3))
-    return System(model=kind(**numbers), load=load, impact=impact or NewtonImpact(e=0.4))
+    return System(model=CellChain(cells=cells, **numbers), load=load, impact=impact or NewtonImpact(e=0.4))
 
 
 def state(cells, seed=1):
@@ -84,14 +86,16 @@ def follow(system, theta, duration=12.0, **more):
     return saltus.simulate(system, **start, velocity=(0.0,) * len(theta), duration=duration, tol=1e-14, **more)
 
 
-@pytest.mark.parametrize("impact", [NewtonImpact(e=0.4), NewtonImpact(e=0.2, transfer=0.5), VelocityReduction(0.9)])
-def test_cells_without_coupling_move_as_each_by_itself(impact):
-    system, theta = chain(ThreeCells, coupling=0.0, impact=impact), state(3)
+@pytest.mark.parametrize(
+    ("cells", "impact"), [(5, NewtonImpact(e=0.4)), (3, NewtonImpact(e=0.2, transfer=0.5)), (3, VelocityReduction(0.9))]
+)
+def test_cells_without_coupling_move_as_each_by_itself(cells, impact):
+    system, theta = chain(cells, coupling=0.0, impact=impact), state(cells)
     together, times = follow(system, theta), np.linspace(0.0, 12.0, 200)
     numbers = {"beta0": BETA80, "mass_ratio": 0.5, "damping": 0.05}
     alone = System(model=TwoLayer(**numbers), load=system.load, impact=impact)
     impacts = 0
-    for cell in range(3):
+    for cell in range(cells):
         own = saltus.simulate(alone, theta=tuple(theta[2 * cell : 2 * cell + 2]), duration=12.0, tol=1e-14)
         np.testing.assert_allclose(together.at(times)[0][2 * cell : 2 * cell + 2], own.at(times)[0], rtol=0, atol=1e-11)
         impacts += len(own.impacts)
@@ -101,7 +105,7 @@ def test_cells_without_coupling_move_as_each_by_itself(impact):
 def test_a_chain_keeps_its_energy_without_damping_and_with_lossless_impacts():
     """Kinetic energy, that of all springs, and that of a constant vertical load V = -0.5 on both masses of every cell."""
     load = Load(frequency=1.0, vertical=-0.5)
-    model = FourCells(beta0=BETA80, coupling=0.4, mass_ratio=0.7, stiffness_ratio=0.8)
+    model = CellChain(cells=4, beta0=BETA80, coupling=0.4, mass_ratio=0.7, stiffness_ratio=0.8)
     motion = follow(
         System(model=model, load=load, impact=NewtonImpact(e=1.0)), state(4, seed=2) + np.tile([0.02, -0.03], 4), 10.0
     )
@@ -112,9 +116,9 @@ def test_a_chain_keeps_its_energy_without_damping_and_with_lossless_impacts():
     np.testing.assert_allclose(energy, energy[0], rtol=0, atol=1e-11)
 
 
-@pytest.mark.parametrize(("kind", "cells"), [(TwoCells, 2), (FourCells, 4)])
-def test_a_chain_looks_the_same_from_its_other_end(kind, cells):
-    system, theta = chain(kind), state(cells, seed=3)
+@pytest.mark.parametrize("cells", [2, 4])
+def test_a_chain_looks_the_same_from_its_other_end(cells):
+    system, theta = chain(cells), state(cells, seed=3)
     ahead = follow(system, theta)
     back = follow(system, theta.reshape(cells, 2)[::-1].ravel())
     assert len(ahead.impacts) > 2
@@ -122,8 +126,8 @@ def test_a_chain_looks_the_same_from_its_other_end(kind, cells):
 
 
 def test_the_springs_of_a_chain_give_the_gradient_of_their_energy():
-    model, theta, load = ThreeCells(beta0=BETA80, coupling=0.7), state(3) + 0.01, Load()
-    without = ThreeCells(beta0=BETA80, coupling=0.0)
+    model, theta, load = CellChain(cells=3, beta0=BETA80, coupling=0.7), state(3) + 0.01, Load()
+    without = CellChain(cells=3, beta0=BETA80, coupling=0.0)
     still = np.zeros(6)
     force = np.array(model.force(0.0, theta, still, load)) - np.array(without.force(0.0, theta, still, load))
 
@@ -137,7 +141,7 @@ def test_the_springs_of_a_chain_give_the_gradient_of_their_energy():
 
 def test_a_chain_with_symmetric_starts_moves_as_one_cell():
     """Equal cells pull on each other with nothing."""
-    system = chain(TwoCells)
+    system = chain(2)
     motion = follow(system, [0.2, 0.0, 0.2, 0.0])
     one = System(model=TwoLayer(beta0=BETA80, mass_ratio=0.5, damping=0.05), load=system.load, impact=system.impact)
     own = saltus.simulate(one, theta=(0.2, 0.0), duration=12.0, tol=1e-14)
@@ -145,7 +149,7 @@ def test_a_chain_with_symmetric_starts_moves_as_one_cell():
 
 
 def test_eight_contacts_have_a_bit_each_in_datasets():
-    system, theta = chain(FourCells), state(4)
+    system, theta = chain(4), state(4)
     motion = follow(system, theta, duration=5.0)
     closed = motion.to_xarray().closed_contacts
     assert closed.flag_masks[-1] == 128
@@ -157,36 +161,85 @@ def test_eight_contacts_have_a_bit_each_in_datasets():
         np.testing.assert_allclose(many[name].values.ravel(), x, rtol=0, atol=1e-9)
 
 
-class Thirteen(TwoCells):
-    """More contacts than are tried."""
+class ManyContacts(ContactModel):
+    """More contacts than a whole number has bits."""
 
-    coordinates = tuple(f"q{i}" for i in range(13))
+    coordinates = tuple(f"q{i}" for i in range(65))
     contacts = tuple(Contact(name=name, coordinate=name) for name in coordinates)
 
+    def force(self, t, q, velocity, load):
+        return q
 
-def test_more_contacts_than_can_be_tried_are_refused():
-    with pytest.raises(ParameterError, match="Thirteen has 13 contacts, and at most 12 can be followed"):
-        System(model=Thirteen(beta0=1.0))
+
+def test_more_contacts_than_can_be_noted_are_refused():
+    with pytest.raises(ParameterError, match="ManyContacts has 65 contacts, and at most 64 can be followed"):
+        System(model=ManyContacts())
 
 
 def test_chains_are_read_from_files_and_survive_them():
-    system = chain(FourCells)
-    assert System.from_toml(system.to_toml()) == system
+    system = chain(11)
+    assert System.from_toml(system.to_toml()) == System.from_json(system.to_json()) == system
+    assert pickle.loads(pickle.dumps(system)) == system
     assert system.parameters["model.coupling"] == 0.3
 
 
+def test_the_number_of_cells_is_part_of_the_structure():
+    system = chain(3)
+    assert "model.cells" not in system.parameters
+    assert len(system.with_({"model.cells": 5}).model.contacts) == 10
+    with pytest.raises(ParameterError, match=r"model\.cells is not a number, so it cannot be varied"):
+        saltus.simulate_many(system, parameters={"model.cells": [2.0, 3.0]}, duration=1.0)
+    for cells in (0, 33, 2.5):
+        with pytest.raises(ParameterError, match="cells must"):
+            CellChain(beta0=1.4, cells=cells)
+
+
+def test_complementarity_problems_are_solved_by_exchanges_as_by_trying_all_sets():
+    """Positive definite problems with 2 to 9 rows, whose only solution is the set that violates nothing."""
+    rng = np.random.default_rng(3)
+    for size in range(2, 10):
+        factor = rng.normal(size=(size, size))
+        matrix, right = factor @ factor.T + 0.1 * np.eye(size), rng.normal(size=size)
+        block, z, tried = np.zeros((size, 2 * size + 1)), np.zeros(size), np.zeros(size)
+        solved, bits = by_exchange(matrix, right, size, 1e-12, block, z)
+        found = [b for b in range(1 << size) if acting(matrix, right, size, b, block, tried) and solves(matrix, right, tried)]
+        assert solved
+        assert found == [bits]
+        assert ((z > 0.0) == [bool(bits >> i & 1) for i in range(size)]).all()
+
+
+def solves(matrix, right, z):
+    return (z > -1e-12).all() and (right + matrix @ z > -1e-10).all()
+
+
+@pytest.mark.parametrize("cells", [6, pytest.param(32, marks=pytest.mark.thorough)])
+def test_cells_that_move_alike_move_as_one_for_any_number_of_them(cells):
+    """All contacts close at one instant, and rest together: more contacts than are tried, and as many as a number has bits."""
+    load = Load(vertical=-0.4)
+    numbers = {"beta0": BETA80, "mass_ratio": 0.5, "damping": 0.05}
+    one = System(model=TwoLayer(**numbers), load=load, impact=NewtonImpact(e=0.2))
+    many = System(model=CellChain(cells=cells, coupling=0.3, **numbers), load=load, impact=NewtonImpact(e=0.2))
+    alone, times = saltus.simulate(one, theta=(0.2, -0.1), duration=8.0), np.linspace(0.0, 8.0, 50)
+    start = dict(zip(many.model.coordinates, [0.2, -0.1] * cells, strict=True))
+    motion = saltus.simulate(many, **start, velocity=(0.0,) * 2 * cells, duration=8.0)
+    assert len(alone.impacts) > 3
+    assert any(event.contact.count("+") == cells - 1 for event in motion.events if event.kind == EventKind.IMPACT)
+    for cell in range(cells):
+        np.testing.assert_allclose(motion.at(times)[0][2 * cell : 2 * cell + 2], alone.at(times)[0], rtol=0, atol=1e-8)
+
+
 @pytest.mark.parametrize(
-    ("kind", "impact"),
-    [(TwoCells, NewtonImpact(e=0.4)), (TwoCells, VelocityReduction(0.9)), (FourCells, NewtonImpact(e=0.0, transfer=0.3))],
+    ("cells", "impact"), [(2, NewtonImpact(e=0.4)), (2, VelocityReduction(0.9)), (4, NewtonImpact(e=0.0, transfer=0.3))]
 )
-def test_chains_in_lanes_are_the_scalar_motions(kind, impact):
+def test_chains_in_lanes_are_the_scalar_motions(cells, impact):
     """Impacts of one contact while others are closed or open, in lanes and one by one: to 1e-9 over two forcing periods."""
-    system, starts = chain(kind, impact=impact), [state(len(kind.coordinates) // 2, seed=seed) for seed in range(20)]
-    columns = dict(zip(kind.coordinates, np.transpose(starts), strict=True))
+    system, starts = chain(cells, impact=impact), [state(cells, seed=seed) for seed in range(20)]
+    names = system.model.coordinates
+    columns = dict(zip(names, np.transpose(starts), strict=True))
     many = saltus.simulate_many(system, **columns, velocity=(0.0,) * len(columns), duration=6.0, tol=1e-14)
     for i, theta in enumerate(starts):
         motion = follow(system, theta, duration=6.0)
-        there = [float(many[name][i]) for name in kind.coordinates]
+        there = [float(many[name][i]) for name in names]
         np.testing.assert_allclose(there, motion.position, rtol=0, atol=1e-9)
 
 

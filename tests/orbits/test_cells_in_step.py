@@ -1,5 +1,7 @@
 """Orbits of chains of cells that move in step, with restitution: contacts of all cells close at one instant."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -12,20 +14,20 @@ from saltus.studies.diagram.simulated import simulate_from
 BETA80 = np.deg2rad(80)
 # Chains with a coupling for which their slowest motions of cells against one another are the same; three cells are compiled
 # for ten times as long as two.
-CHAINS = [(saltus.TwoCells, 0.25), pytest.param((saltus.ThreeCells, 0.5), marks=pytest.mark.thorough)]
+CHAINS = [(2, 0.25), pytest.param((3, 0.5), marks=pytest.mark.thorough)]
 
 
-def cells(kind: type, **numbers: float) -> saltus.System:
+def cells(kind: type, **numbers: Any) -> saltus.System:
     load = saltus.Load(frequency=1.0, vertical=-0.5, horizontal=saltus.Harmonic(amplitude=0.6))
     return saltus.System(
         model=kind(beta0=BETA80, mass_ratio=0.2, damping=0.05, **numbers), load=load, impact=saltus.NewtonImpact(e=0.5)
     )
 
 
-@pytest.fixture(scope="module", params=CHAINS, ids=lambda chain: chain[0].__name__)
+@pytest.fixture(scope="module", params=CHAINS, ids=lambda chain: f"{chain[0]} cells")
 def chain(request: pytest.FixtureRequest) -> saltus.System:
-    kind, coupling = request.param
-    return cells(kind, coupling=coupling)
+    count, coupling = request.param
+    return cells(saltus.CellChain, cells=count, coupling=coupling)
 
 
 def begun(chain: saltus.System, last: float) -> dict[str, float]:

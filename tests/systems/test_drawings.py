@@ -8,12 +8,12 @@ import pytest
 
 from saltus import (
     BeltOscillator,
+    CellChain,
     ImpactPair,
     Metainterface,
     Model,
     RockingBlock,
     System,
-    ThreeCells,
     TwoLayer,
     TwoStops,
     WallOscillator,
@@ -29,7 +29,7 @@ STATES = {
     BeltOscillator(): [[0.0], [0.4]],
     Metainterface(beta0=1.4): [[0.0], [0.5], [-0.5]],
     TwoLayer(beta0=1.4): [[0.0, 0.0], [0.4, -0.6]],
-    ThreeCells(beta0=1.4): [[0.0] * 6, [0.4, -0.6, 0.2, -0.1, 0.0, -0.3]],
+    CellChain(cells=3, beta0=1.4): [[0.0] * 6, [0.4, -0.6, 0.2, -0.1, 0.0, -0.3]],
 }
 
 

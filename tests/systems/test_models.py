@@ -168,7 +168,7 @@ ANSWERS = {  # holds_coordinates, has_one_contact, names_its_contacts, has_state
     "BeltOscillator": (True, False, False, False, (1,)),
     "TwoLayer": (True, False, True, False, (1,)),
     "ImpactPair": (True, False, True, False, (1,)),
-    "FourCells": (True, False, True, False, (1,)),
+    "CellChain": (True, False, True, False, (1,)),
 }
 
 

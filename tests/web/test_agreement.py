@@ -103,7 +103,7 @@ def layers(rng):
 
 def cells(rng):
     load = shaken(rng, "horizontal", vertical=rng.uniform(-0.6, -0.3))
-    model = saltus.TwoCells(beta0=rng.uniform(1.3, 1.5), damping=rng.uniform(0.05, 0.3), coupling=rng.uniform(0.0, 0.3))
+    model = saltus.CellChain(cells=2, beta0=rng.uniform(1.3, 1.5), damping=rng.uniform(0.05, 0.3), coupling=rng.uniform(0.0, 0.3))
     law = saltus.NewtonImpact(e=rng.uniform(0.0, 0.5), transfer=rng.uniform(0.3, 0.9))
     return System(model=model, load=load, impact=law), {"lower_1": 0.2, "upper_1": 0.0, "lower_2": 0.1, "upper_2": 0.0}
 

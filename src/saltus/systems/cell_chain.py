@@ -10,21 +10,17 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.checks import settle_numbers
-from saltus.systems.contact_model import Contact, ContactModel
+from saltus.checks import check_count, settle_numbers
+from saltus.systems.contact_model import MOST_CONTACTS, Contact, ContactModel
 from saltus.systems.load import Load
 from saltus.systems.metainterface import LayeredCell
-from saltus.systems.model import MarginKind
+from saltus.systems.model import Count, MarginKind
 from saltus.systems.two_layer import TwoLayer
-
-
-def _names(cells: int) -> tuple[str, ...]:
-    return tuple(f"{layer}_{cell}" for cell in range(1, cells + 1) for layer in ("lower", "upper"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CellChain(LayeredCell, ContactModel):
-    """Cells side by side, each a `TwoLayer` with the same numbers and loads; its subclasses have two, three or four cells.
+    """Cells side by side, each a `TwoLayer` with the same numbers and loads.
 
     Long horizontal springs join each mass to that of the same layer in the neighbouring cell: with the displacements
 
@@ -33,17 +29,57 @@ class CellChain(LayeredCell, ContactModel):
     of the lower and the upper mass of a cell, in units of l, the energy of the springs per K2 is kappa / 2 times the sum of the
     squares of the differences of u_j between neighbouring cells. Coordinates are theta_1 >= 0 (`lower_1`, `lower_2`, ...) and
     theta_2 <= 0 (`upper_1`, ...); each has a contact of the same name. An impact passes its speed on within its cell only.
+
+    Parameters
+    ----------
+    beta0
+        The angle of the undeformed cell, rad, in (0, pi).
+    cells
+        How many cells there are, from 1 to 32. It is part of the structure, as the classes of a system's parts are: its equations
+        are compiled for each number of cells, and nothing is computed along it.
+    coupling
+        kappa, the stiffness of a spring times length squared, over K2; at least 0.
+    damping
+        C, the damping of the upper layer, at least 0.
+    stiffness_ratio
+        k = K1 / K2, above 0.
+    mass_ratio
+        m = M1 / M2, at least 0.
+    dissipation_ratio
+        c = C1 / C2, at least 0.
+
+    Raises
+    ------
+    ParameterError
+        A number outside its range, or a number of cells that is not whole.
+
+    Examples
+    --------
+    >>> saltus.CellChain(beta0=1.4, cells=3, coupling=0.5).coordinates
+    ('lower_1', 'upper_1', 'lower_2', 'upper_2', 'lower_3', 'upper_3')
     """
 
+    cells: int = 2
     coupling: float = 0.1  # kappa = stiffness of a spring times length squared, over K2; at least 0
 
-    cells: ClassVar[int] = 1
     singularity: ClassVar[str] = "massless_hinge"
     transfers: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         LayeredCell.__post_init__(self)
         settle_numbers(self, "coupling", at_least=0.0)
+        check_count("cells", self.cells, at_least=1, at_most=MOST_CONTACTS // 2)
+        object.__setattr__(self, "cells", Count(self.cells))
+
+    @property  # type: ignore[override]  # a class whose numbers say how many coordinates it has
+    def coordinates(self) -> tuple[str, ...]:
+        """The angles of the lower and of the upper layer of each cell."""
+        return _names(self.cells)
+
+    @property  # type: ignore[override]
+    def stops(self) -> tuple[str, ...]:
+        """All margins: no layer has positions beyond its kinematic limit."""
+        return tuple(f"{name}_kinematic_limit" for name in self.coordinates)
 
     def unit_of(self, coordinate: str) -> str:
         """Radians."""
@@ -119,74 +155,9 @@ class CellChain(LayeredCell, ContactModel):
         return MarginKind.LIMIT
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TwoCells(CellChain):
-    """A `CellChain` of two cells.
-
-    Parameters
-    ----------
-    beta0
-        The angle of the undeformed cell, rad, in (0, pi).
-    coupling
-        kappa, the stiffness of a spring times length squared, over K2; at least 0.
-    damping
-        C, the damping of the upper layer, at least 0.
-    stiffness_ratio
-        k = K1 / K2, above 0.
-    mass_ratio
-        m = M1 / M2, at least 0.
-    dissipation_ratio
-        c = C1 / C2, at least 0.
-
-    Examples
-    --------
-    >>> saltus.TwoCells(beta0=1.4, coupling=0.5).coordinates
-    ('lower_1', 'upper_1', 'lower_2', 'upper_2')
-    """
-
-    cells: ClassVar[int] = 2
-    coordinates: ClassVar[tuple[str, ...]] = _names(2)
-    stops: ClassVar[tuple[str, ...]] = tuple(f"{name}_kinematic_limit" for name in _names(2))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ThreeCells(CellChain):
-    """A `CellChain` of three cells.
-
-    Parameters
-    ----------
-    beta0, coupling, damping, stiffness_ratio, mass_ratio, dissipation_ratio
-        As for `TwoCells`.
-
-    Examples
-    --------
-    >>> saltus.ThreeCells(beta0=1.4, coupling=0.5).coordinates
-    ('lower_1', 'upper_1', 'lower_2', 'upper_2', 'lower_3', 'upper_3')
-    """
-
-    cells: ClassVar[int] = 3
-    coordinates: ClassVar[tuple[str, ...]] = _names(3)
-    stops: ClassVar[tuple[str, ...]] = tuple(f"{name}_kinematic_limit" for name in _names(3))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FourCells(CellChain):
-    """A `CellChain` of four cells.
-
-    Parameters
-    ----------
-    beta0, coupling, damping, stiffness_ratio, mass_ratio, dissipation_ratio
-        As for `TwoCells`.
-
-    Examples
-    --------
-    >>> len(saltus.FourCells(beta0=1.4).coordinates)
-    8
-    """
-
-    cells: ClassVar[int] = 4
-    coordinates: ClassVar[tuple[str, ...]] = _names(4)
-    stops: ClassVar[tuple[str, ...]] = tuple(f"{name}_kinematic_limit" for name in _names(4))
+@cache
+def _names(cells: int) -> tuple[str, ...]:
+    return tuple(f"{layer}_{cell}" for cell in range(1, cells + 1) for layer in ("lower", "upper"))
 
 
 @cache

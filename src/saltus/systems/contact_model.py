@@ -182,7 +182,9 @@ class LoadOnSides:
         return getattr(self._load, name)
 
 
-MOST_CONTACTS = 12  # Which contacts are closed is found by trying, with 2^n choices at worst.
+MOST_CONTACTS = np.iinfo(
+    np.int64
+).bits  # Which are closed is noted in the bits of a whole number, in which a friction or a surface takes two.
 MOST_FRICTIONS = 6  # Which frictions stick, and which way the others slide, is found by trying 3^n choices at worst.
 
 

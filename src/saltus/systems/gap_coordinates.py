@@ -79,7 +79,7 @@ class InGapCoordinates(ContactModel):
 
     def sums(self) -> tuple[list[list[Any]], list[dict[str, Any]]]:
         """A as rows, and for each row the coefficients of load channels in m(t)."""
-        names = self.own_class.coordinates
+        names = super().coordinates
         rows = [[float(i == j) for j in range(len(names))] for i in range(len(names))]
         moving: list[dict[str, Any]] = [{} for _ in names]
         parts: list[Contact | Surface] = [*super().contacts, *super().surfaces]

@@ -28,6 +28,13 @@ class MarginKind(StrEnum):
     LIMIT = "limit"  #: the mechanism has no such positions
 
 
+class Count(int):
+    """A whole number of a part of a system that says how many of something there are, such as cells: it belongs to the structure,
+    as names do, and is none of the numbers that have dotted paths and vary."""
+
+    __slots__ = ()
+
+
 class Model:
     """A smooth oscillator, and what all models share. Subclass it as a frozen, keyword-only dataclass of numbers and give it:
 

@@ -230,8 +230,9 @@ def check_contact_model(model: ContactModel) -> bool:
     contacts, frictions, kind = model.contacts, model.frictions, type(model).__name__
     if model.sides:
         raise ParameterError(f"{kind} is a ContactModel, so it has no sides: leave them out", "model")
-    rows = ("frictions and surfaces", len(frictions) + len(model.surfaces), MOST_FRICTIONS)
-    for what, count, most in (("contacts", len(contacts), MOST_CONTACTS), rows):
+    rows = len(frictions) + len(model.surfaces)
+    given = (("frictions and surfaces", rows, MOST_FRICTIONS), ("contacts", len(contacts), MOST_CONTACTS - 2 * rows))
+    for what, count, most in given:
         if count > most:
             raise ParameterError(f"{kind} has {count} {what}, and at most {most} can be followed", "model")
     parts: tuple[Contact | Surface, ...] = (*contacts, *model.surfaces)

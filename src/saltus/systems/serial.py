@@ -18,7 +18,7 @@ from saltus.errors import ParameterError, SaltusError, near, shown
 from saltus.systems.gap_coordinates import IN_GAPS, in_gap_coordinates
 from saltus.systems.impact_laws import Factors, ImpactLaw
 from saltus.systems.load import Load
-from saltus.systems.model import Model, OneContactModel, check_one_contact
+from saltus.systems.model import Count, Model, OneContactModel, check_one_contact
 from saltus.systems.signals import Constant, Harmonic, Pulse, Record, Signal, Sum, as_signal
 
 
@@ -39,8 +39,8 @@ def _fields_of(kind: type) -> tuple[str, ...]:
 
 
 def is_number(value: Any) -> bool:
-    """Whether a leaf is a number of the system; switches and names belong to its structure."""
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
+    """Whether a leaf is a number of the system; switches, names and counts belong to its structure."""
+    return isinstance(value, (int, float)) and not isinstance(value, (bool, Count))
 
 
 def is_fixed(node: Any) -> bool:
@@ -163,7 +163,7 @@ class NamedTypes(UserDict[str, Any]):
 
 MODELS = NamedTypes(
     dict.fromkeys(("Metainterface", "RockingBlock", "TwoLayer", "WallOscillator", "TwoStops", "ImpactPair", "BeltOscillator"))
-    | dict.fromkeys(("TwoCells", "ThreeCells", "FourCells"))
+    | {"CellChain": None}
 )
 IMPACTS = NamedTypes(dict.fromkeys(("VelocityReduction", "EnergyRestitution", "InelasticImpact", "NewtonImpact")))
 PULSES = NamedTypes(dict.fromkeys(("HalfSine", "OneSine", "OneCosine", "MavroeidisPapageorgiou", "Ricker", "Ramp", "Chirp")))

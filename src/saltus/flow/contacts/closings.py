@@ -29,6 +29,7 @@ import math
 
 import numpy as np
 
+from saltus.flow.contacts.complementarity import exchanged
 from saltus.flow.contacts.frictions import choose_slides, hold_frictions, slides_so
 from saltus.flow.contacts.impacts import (
     apply_impulses,
@@ -44,7 +45,7 @@ from saltus.flow.contacts.impacts import (
     record_contact_event,
     settle_contact,
 )
-from saltus.flow.contacts.layout import APART, TIED, ContactColumn, ImpactDetail, copy_all
+from saltus.flow.contacts.layout import APART, MOST_TRIED, TIED, ContactColumn, ImpactDetail, copy_all
 from saltus.flow.contacts.tangent import (
     clear_shifts,
     closing_columns,
@@ -68,10 +69,10 @@ from saltus.taylor import jit, lean_jit
 
 
 @lean_jit
-def holds(motion, candidates):
-    """Whether the first non-zero Taylor coefficients of the guards confirm the choice of closed contacts among the candidates;
-    notes how many coefficients before them are 0."""
-    order, g, count = motion.order, motion.gap_series, motion.contacts.shape[0]
+def violated(motion, candidates):
+    """The candidates of which the first non-zero Taylor coefficient of the guard contradicts the choice of closed contacts, as
+    bits; notes how many coefficients before it are 0."""
+    order, g, count, wrong = motion.order, motion.gap_series, motion.contacts.shape[0], 0
     for i in range(count):
         if not candidates >> i & 1:
             continue
@@ -79,14 +80,38 @@ def holds(motion, candidates):
         if motion.contacts[i, ContactColumn.CLOSED] == 1:
             k = leading(motion.margin_series[i], known, order)
             if k < order and motion.margin_series[i, k] < 0.0:
-                return False
+                wrong |= 1 << i
         else:
             gap_series(motion, i, contact_position(motion, i), order, g)
             k = leading(g, 2 + known, order)
             if k == order or g[k] < 0.0:
-                return False
+                wrong |= 1 << i
         motion.contacts[i, ContactColumn.SKIP] = k
-    return True
+    return wrong
+
+
+@lean_jit
+def exchange_closed(motion, candidates, still, t):
+    """As `choose_closed`, where there are too many contacts for trying all choices: by exchanges (`complementarity.py`)."""
+    count = motion.contacts.shape[0]
+    for number in range(3 ** motion.frictions.shape[0]):
+        if not choose_slides(motion, still, number):
+            continue
+        closed, wrong, least = candidates, candidates, count + 1
+        for _ in range(count * count):
+            for i in range(count):
+                if candidates >> i & 1:
+                    motion.contacts[i, ContactColumn.CLOSED] = closed >> i & 1
+            hold_coordinates(motion)
+            hold_frictions(motion)
+            expand(motion, t, 1.0, motion.order)
+            wrong = violated(motion, candidates)
+            if not wrong:
+                break
+            closed, least = exchanged(closed, wrong, least)
+        if not wrong and slides_so(motion, count, still):
+            return True
+    return False
 
 
 @lean_jit
@@ -98,6 +123,8 @@ def choose_closed(motion, candidates, still, t):
     that can.
     """
     count = motion.contacts.shape[0]
+    if count > MOST_TRIED:
+        return exchange_closed(motion, candidates, still, t)
     for number in range((1 << count) * 3 ** motion.frictions.shape[0]):
         choice = number & ((1 << count) - 1)  # the bits of those that open
         if choice & ~candidates or not choose_slides(motion, still, number >> count):
@@ -108,7 +135,7 @@ def choose_closed(motion, candidates, still, t):
         hold_coordinates(motion)
         hold_frictions(motion)
         expand(motion, t, 1.0, motion.order)
-        agrees = holds(motion, candidates)
+        agrees = violated(motion, candidates) == 0
         if agrees and slides_so(motion, count, still):
             return True
     return False
@@ -181,8 +208,8 @@ def impact_of(motion, t, hit):
         if hit >> i & 1:
             motion.rates[i] = min(motion.rates[i], 0.0)
         motion.gaps[i] = motion.rates[i]
-    acts = impact_impulses(motion, chosen, motion.rates) if regular else -1
-    if acts < 0:
+    solved, acts = impact_impulses(motion, chosen, motion.rates)
+    if not (regular and solved):
         return -1
     jump_columns(motion, hit)
     jump_first_order(motion, hit)

@@ -1,4 +1,8 @@
-"""Linear complementarity problems of a few contacts, solved by trying all sets of acting contacts.
+"""Linear complementarity problems of contacts: of a few solved by trying all sets of acting contacts, of many by exchanges.
+
+An exchange adds the rows of which the inequality is violated to those that act, or takes them away. All of them are exchanged as
+long as fewer and fewer are violated, and else the first one alone. With the first one alone the method ends at the only solution
+of a problem with a positive definite matrix (Murty 1974).
 
 Its compiled part goes into one module with that of `kernel.py`.
 """
@@ -7,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.flow.contacts.layout import VIOLATED
+from saltus.flow.contacts.layout import MOST_TRIED, VIOLATED
 from saltus.taylor import lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
@@ -74,15 +78,48 @@ def acting(matrix, right, size, bits, block, z):
 
 
 @lean_jit
+def exchanged(bits, wrong, least):
+    """The bits after an exchange of those in `wrong`, and how few of them there have been."""
+    count, left = 0, wrong
+    while left:
+        left &= left - 1
+        count += 1
+    return bits ^ (wrong if count < least else wrong & -wrong), min(count, least)
+
+
+@lean_jit
+def by_exchange(matrix, right, size, rounding, block, z):
+    """As `complementary`, by exchanges: whether a solution is found, and the bits of the rows that act."""
+    bits, least = 0, size + 1
+    for _ in range(size * size):
+        if not acting(matrix, right, size, bits, block, z):
+            return False, 0
+        wrong = 0
+        for i in range(size):
+            left = -z[i] * abs(matrix[i, i])
+            if not bits >> i & 1:
+                left = -right[i]
+                for j in range(size):
+                    left -= matrix[i, j] * z[j]
+            wrong |= 1 << i if left > rounding else 0
+        if not wrong:
+            return True, bits
+        bits, least = exchanged(bits, wrong, least)
+    return False, 0
+
+
+@lean_jit
 def complementary(matrix, right, size, block, tried, z):
-    """Find z with 0 <= z _|_ right + matrix z >= 0; returns the bits of the rows that act (z > 0), or -1 if there is no solution.
+    """Find z with 0 <= z _|_ right + matrix z >= 0; returns whether there is one, and the bits of the rows that act (z > 0).
 
     The first set of acting rows that violates no inequality is taken; if all violate some, the set with the smallest violation,
     as long as that may be rounding.
     """
-    found, least, scale = -1, np.inf, 0.0
+    found, least, scale = 0, np.inf, 0.0
     for i in range(size):
         scale = max(scale, abs(right[i]))
+    if size > MOST_TRIED:
+        return by_exchange(matrix, right, size, VIOLATED * scale, block, z)
     for bits in range(1 << size):
         if not acting(matrix, right, size, bits, block, tried):
             continue
@@ -101,4 +138,4 @@ def complementary(matrix, right, size, block, tried, z):
                 z[i] = tried[i]
         if worst <= 0.0:
             break
-    return found if least <= VIOLATED * scale else -1
+    return least <= VIOLATED * scale, found

@@ -115,7 +115,7 @@ def impact_impulses(motion, chosen, rates):
     """Find the impulses J of the contacts in `chosen`: 0 <= J _|_ v+ + E v- >= 0 with v+ = v- + G J.
 
     `rates` holds v- of all contacts, and afterwards v+. For a contact that acts v+ is set to -E v-, so that a rate of 0 is
-    exactly 0. Returns the contacts that act as bits, or -1 if there is no solution.
+    exactly 0. Returns whether there is a solution, and the contacts that act as bits.
     """
     size, row, after, count = reduce_to(motion, chosen), 0, motion.tried, motion.contacts.shape[0]
     for i in range(count):
@@ -125,9 +125,9 @@ def impact_impulses(motion, chosen, rates):
                 if chosen >> j & 1:
                     motion.right[row] += restitution(motion, i, j) * rates[j]
             row += 1
-    bits = complementary(motion.reduced, motion.right, size, motion.block, motion.tried, motion.impulses)
-    if bits < 0:
-        return -1
+    solved, bits = complementary(motion.reduced, motion.right, size, motion.block, motion.tried, motion.impulses)
+    if not solved:
+        return False, 0
     acts, row = 0, 0
     for i in range(count):
         if chosen >> i & 1:
@@ -153,7 +153,7 @@ def impact_impulses(motion, chosen, rates):
                 after[i] = max(after[i], 0.0)
     for i in range(count):
         rates[i] = after[i] + 0.0
-    return acts
+    return True, acts
 
 
 @lean_jit
@@ -240,17 +240,17 @@ def closed_pulls(motion, near, b, x, u, pull):
         if still >> i & 1:
             motion.right[row] = b[i]
             row += 1
-    bits = complementary(motion.reduced, motion.right, size, motion.block, motion.tried, motion.impulses)
+    solved, bits = complementary(motion.reduced, motion.right, size, motion.block, motion.tried, motion.impulses)
     for i in range(count):
         pull[i], row = b[i], 0
         for j in range(count):
             if still >> j & 1:
-                pull[i] += motion.coupling[i, j] * motion.impulses[row] if bits >= 0 else 0.0
+                pull[i] += motion.coupling[i, j] * motion.impulses[row] if solved else 0.0
                 row += 1
     row = 0
     for i in range(count):
         if still >> i & 1:
-            if bits >= 0 and bits >> row & 1:
+            if solved and bits >> row & 1:
                 pull[i] = 0.0
             row += 1
     return still
@@ -274,18 +274,18 @@ def time_to_close(x, u, a):
 
 
 @lean_jit
-def frozen_accumulation(motion, near, limit):
+def frozen_accumulation(motion, near, beside, limit):
     """The time in which the contacts in `near` lose all speed by impacts, if the accelerations stay constant.
 
-    Each gap then follows parabolas between its impacts. No other contact may close meanwhile. If they do not lose their speed
-    within `limit`, minus the number of impacts that were followed is returned. Which of the contacts stay closed is decided
-    later.
+    Each gap then follows parabolas between its impacts. No other contact in `beside` may close meanwhile. If they do not lose
+    their speed within `limit`, minus the number of impacts that were followed is returned. Which of the contacts stay closed is
+    decided later.
     """
     time, first, b, pull, count = 0.0, 0.0, motion.pulls, motion.falling_pulls, motion.contacts.shape[0]
     x, u = motion.falling_gaps, motion.falling_rates
     for i in range(count):
         x[i], u[i] = motion.gaps[i], motion.rates[i]
-        if not near >> i & 1:
+        if beside >> i & 1 and not near >> i & 1:
             limit = min(limit, 0.1 * time_to_close(x[i], u[i], b[i]))
         first = max(first, abs(u[i]) if near >> i & 1 else 0.0)
     for followed in range(MOST_FROZEN_IMPACTS):
@@ -308,7 +308,8 @@ def frozen_accumulation(motion, near, limit):
                 x[i], u[i] = x[i] + flight * (u[i] + 0.5 * flight * pull[i]), u[i] + flight * pull[i]
                 if x[i] <= 1e-12 * height and u[i] < 0.0:
                     x[i], hit = 0.0, hit | 1 << i
-        if impact_impulses(motion, hit, u) < 0:
+        solved, _ = impact_impulses(motion, hit, u)
+        if not solved:
             return -1.0 - followed
         done = True
         for i in range(count):
@@ -364,7 +365,7 @@ def bring_to_rest(motion, near):
         if near >> i & 1:
             motion.right[row] = motion.rates[i]
             row += 1
-    acting(motion.reduced, motion.right, size, (1 << size) - 1, motion.block, motion.tried)
+    acting(motion.reduced, motion.right, size, -1, motion.block, motion.tried)
     row = 0
     for i in range(count):
         motion.impulses[i] = 0.0

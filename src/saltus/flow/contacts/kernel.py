@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from saltus.flow.contacts.closings import choose_closed, contact_impact, note_ties, rests_in_a_row
+from saltus.flow.contacts.closings import block_of, choose_closed, contact_impact, note_ties, rests_in_a_row
 from saltus.flow.contacts.frictions import (
     all_stand,
     begin_on_surfaces,
@@ -45,7 +45,7 @@ from saltus.flow.contacts.impacts import (
     slow_impacts,
     smaller_set,
 )
-from saltus.flow.contacts.layout import GAP_ROUNDING, NEAR, TRIED_AGAIN, ContactColumn, FrictionColumn, solver_arrays
+from saltus.flow.contacts.layout import GAP_ROUNDING, MOST_TRIED, NEAR, TRIED_AGAIN, ContactColumn, FrictionColumn, solver_arrays
 from saltus.flow.contacts.tangent import (
     accumulation_shifts,
     clear_shifts,
@@ -99,18 +99,24 @@ def end_accumulation_of(motion, t):
     if near == 0:
         return t
     limit = min(np.sqrt(10.0 * tol / change), motion_end(motion) - t)
-    left, moving = frozen_accumulation(motion, near, limit), 0
+    together, left, moving = near, frozen_accumulation(motion, near, -1, limit), 0
     if left < 0.0:
         near = smaller_set(motion, near)
-        again = frozen_accumulation(motion, near, limit) if near > 0 else -1.0
+        again = frozen_accumulation(motion, near, -1, limit) if near != 0 else -1.0
         left = again if again >= 0.0 else left + again
+    if left < 0.0 and count > MOST_TRIED:  # other blocks, which do not act on this one, may be bouncing too
+        block = block_of(motion, 1 << last, False)
+        if together & ~block:
+            near = together & block
+            again = frozen_accumulation(motion, near, block, limit)
+            left = again if again >= 0.0 else left + again
     slow = slow_impacts(tol)
     while left < 0.0 and slow >= slowest:  # on ever smaller scales, as of bodies that collapse beside others that still move
         slow *= 1e-3
         slower = near_contacts(motion, slow)
-        if slower != near and slower > 0:
+        if slower != near and slower != 0:
             near = slower
-            again = frozen_accumulation(motion, near, limit)
+            again = frozen_accumulation(motion, near, -1, limit)
             left = again if again >= 0.0 else left + again
     for i in range(count):
         moving |= (1 << i) if near >> i & 1 and motion.rates[i] != 0.0 else 0
@@ -195,7 +201,9 @@ def decide_contacts(motion):
     for k in range(motion.frictions.shape[0]):
         motion.frictions[k, FrictionColumn.REACHED] = 0
     if motion.rested == 1 and not rested:
-        all_bits = closed_bits(motion) | ((1 << motion.frictions.shape[0]) - 1) << count
+        all_bits = closed_bits(motion)
+        for k in range(motion.frictions.shape[0]):
+            all_bits |= 1 << (count + k)
         record_contact_event(motion, EventCode.REST, all_bits, settled)
         note_shifts(motion, motion.event_shifts)
     motion.mode = Mode.REST if motion.rested == 1 else Mode.ARC

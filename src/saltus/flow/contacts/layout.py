@@ -86,6 +86,7 @@ NEAR = (
     2.0**-44
 )  # Contacts close together if, when one closes, the other's gap is no larger than this share of its size in the step.
 GAP_ROUNDING = 2.0**-6  # The rounding of a gap, in units of NEAR times the contact's position.
+MOST_TRIED = 8  # For models with more contacts sets of them are found by exchanges, as there are too many to try them all.
 VIOLATED = 1e-12  # The largest violation of a complementarity problem that may be rounding, as a share of its right-hand side.
 MOST_FROZEN_IMPACTS = 100_000  # Impacts of an accumulation that are followed at most: e = 0.9996 needs so many for 16 digits.
 APART = 1e-9  # Contacts close together in neighbouring motions too if their shifts differ by less than this share.

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import zip_longest
 from typing import Any
 
+from saltus.flow.contacts.layout import MOST_TRIED
 from saltus.taylor import Expr, Trace, combine, differentiate, number, ordered, substitute
 
 Factors = tuple[Expr, ...]
@@ -178,8 +179,8 @@ class OneFree:
 
 
 def equations_of_one_free(trace: Trace, margins: list[Expr]) -> OneFree | None:
-    """The equations with one free coordinate, if each coordinate has one contact; else None. `margins` have accelerations
-    substituted.
+    """The equations with one free coordinate, if each of a few coordinates has one contact; else None. `margins` have
+    accelerations substituted.
 
     All contacts but that of the free coordinate are then closed, so that the other coordinates are constants. None is given for a
     trace with a tangent, because the derivatives of the other coordinates need not be constant.
@@ -187,6 +188,7 @@ def equations_of_one_free(trace: Trace, margins: list[Expr]) -> OneFree | None:
     own = trace.dof
     if (
         len(trace.signs) < 2
+        or own > MOST_TRIED  # of many it is rare that only one is free, and the equation would choose among as many
         or trace.friction_coordinates
         or sorted(trace.contact_coordinates) != list(range(own))
         or trace.columns

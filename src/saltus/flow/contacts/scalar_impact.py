@@ -17,7 +17,6 @@ from saltus.flow.contacts.impacts import (
 )
 from saltus.flow.contacts.lane_handoff import functions_of
 from saltus.flow.contacts.lane_impacts import read_contacts, write_closed
-from saltus.flow.contacts.layout import ContactColumn
 from saltus.flow.kernel.memory import LaneImpactParts, MotionMemory
 from saltus.flow.kernel.steps import state_arrays
 from saltus.flow.lanes.function_types import CONTACTS_IMPACT
@@ -47,16 +46,17 @@ def contacts_impact(lane, hit):
     for i in range(contacts.shape[0]):
         if hit >> i & 1:
             speed = min(speed, -rates[i])
-    if not regular or not speed > 0.0 or impact_impulses(motion, chosen, rates) < 0:
+    solved, _ = impact_impulses(motion, chosen, rates)
+    if not regular or not speed > 0.0 or not solved:
         return 0
     jump_first_order(motion, hit)
     apply_impulses(motion)
-    free = (1 << own) - 1
+    free = own
     for i in range(contacts.shape[0]):
         if chosen >> i & 1:
             settle_contact(motion, i, rates[i])
             if rates[i] == 0.0:
-                free &= ~(1 << contacts[i, ContactColumn.COORDINATE])
+                free -= 1
             elif rates[i] <= lane.settings.slowest_impact:
                 return 0
     if free == 0:

@@ -121,8 +121,8 @@ def given_impact(motion, hit, after):
         chosen |= motion.contacts[i, ContactColumn.CLOSED] << i
         unit[i] = -1.0 if i == hit else 0.0
         motion.gaps[i] = motion.rates[i]
-    acts = impact_impulses(motion, chosen, unit)
-    if acts < 0 or not stays_closed(motion, count, acts, after):
+    solved, acts = impact_impulses(motion, chosen, unit)
+    if not solved or not stays_closed(motion, count, acts, after):
         return False
     note_velocities(motion, 0.0)
     jump_columns(motion, 1 << hit)

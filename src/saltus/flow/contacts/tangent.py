@@ -260,7 +260,7 @@ def accumulation_shifts(motion, near, t):
         change, step = 0.0, RELATIVE_STEP / max(largest, 1e-300)
         for sign in (1.0, -1.0):
             perturb(motion, j, sign * step)
-            left = frozen_accumulation(motion, near, np.inf)
+            left = frozen_accumulation(motion, near, near, np.inf)
             change += sign * (left if left >= 0.0 else math.nan)
             copy_all(gaps, motion.gaps)
             copy_all(rates, motion.rates)

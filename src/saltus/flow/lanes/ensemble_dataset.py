@@ -9,7 +9,7 @@ import numpy as np
 from saltus.checks import answered, check_dataset
 from saltus.flow.kernel.layout import LOSSLESS, Status
 from saltus.flow.lanes.options import Sample, Until
-from saltus.flow.motion.events import Stop
+from saltus.flow.motion.events import Stop, masks_of, type_of_bits
 from saltus.flow.motion.motion import rate_name, state_names
 from saltus.result import provenance
 from saltus.systems import energy_gains
@@ -108,8 +108,8 @@ def _add_ends(writer: _Writer, result: EnsembleResult) -> None:
     writer.add("time", result.time, "1", "dimensionless time tau at the end")
     names = [contact.name for contact in result.system.model.contacts]
     if names:
-        closed = (ends.rows["side"] - 1).astype(np.int16)
-        writer.add("closed_contacts", closed, "1", "contacts that are closed at the end", **_masks(names))
+        closed = (ends.rows["side"] - 1).astype(type_of_bits(len(names)))
+        writer.add("closed_contacts", closed, "1", "contacts that are closed at the end", **masks_of(names))
     writer.add("side", result.side.astype(np.int8), "1", "side at the end, 0 at rest")
     writer.add("impact_count", ends.rows["impacts"], "1", "impacts")
     writer.add("grazings", ends.rows["grazings"], "1", "touches of the contact without an impact")
@@ -119,19 +119,14 @@ def _add_ends(writer: _Writer, result: EnsembleResult) -> None:
     writer.add("chatter_speed", ends.rows["chatter_speed"], "1", text)
 
 
-def _masks(names: list[str]) -> dict[str, Any]:
-    """The attributes of the CF conventions that say what the bits of a number stand for."""
-    return {"flag_masks": np.array([1 << i for i in range(len(names))], dtype=np.int16), "flag_meanings": " ".join(names)}
-
-
 def _add_gains(writer: _Writer, system: System, inputs: Inputs) -> None:
     """The contacts at which the impact law may gain energy, as in `Validity.gains`."""
     twin = inputs.with_numbers(system.in_gap_coordinates)
-    which = np.zeros(inputs.size, dtype=np.int16)
-    gains = energy_gains(twin.model, twin.impact, which.shape)
-    for i, gain in enumerate(gains.values()):
-        which |= np.where(gain > LOSSLESS, 1 << i, 0).astype(np.int16)
-    writer.add("gaining_contacts", which, "1", "contacts at which impacts may gain energy", **_masks(list(gains)))
+    gains = energy_gains(twin.model, twin.impact, (inputs.size,))
+    which = np.zeros(inputs.size, dtype=type_of_bits(len(gains)))
+    for gain, bit in zip(gains.values(), masks_of(list(gains))["flag_masks"], strict=True):
+        which |= np.where(gain > LOSSLESS, bit, which.dtype.type(0))
+    writer.add("gaining_contacts", which, "1", "contacts at which impacts may gain energy", **masks_of(list(gains)))
 
 
 def _add_inputs(writer: _Writer, inputs: Inputs) -> dict[str, float]:

@@ -224,14 +224,25 @@ class ContactEvents(MotionEvents):
         """The impacts, as arrays; `side` has the bits of the contacts that were hit, velocities are (n, coordinates)."""
         impacts = self._of_kinds(EventKind.IMPACT, *also)
         before, after, _ = impacts._parts(slice(None))
-        return Impacts(impacts.times, impacts._labels[:, 2].astype(np.int16), before, after)
+        return Impacts(impacts.times, impacts._labels[:, 2].astype(type_of_bits(len(self._contacts))), before, after)
+
+
+def type_of_bits(count: int) -> type[np.signedinteger[Any]]:
+    """The type of numbers with a bit for each of so many contacts."""
+    return np.int16 if count < 16 else np.int64
+
+
+def masks_of(names: Sequence[str]) -> dict[str, Any]:
+    """The attributes of the CF conventions that say what the bits of a number stand for."""
+    masks = np.left_shift(np.int64(1), np.arange(len(names))).astype(type_of_bits(len(names)))
+    return {"flag_masks": masks, "flag_meanings": " ".join(names)}
 
 
 def modes_of(model: Model, side: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
     """Closed contacts as bits, and the direction in which each friction slides, from the numbers `side` of motions."""
     count, number = len(model.contacts), np.asarray(side).astype(np.int64) - 1
     slides = [(number >> (count + 2 * k) & 3) - 1 for k in range(len(model.frictions))]
-    return number & ((1 << count) - 1), slides
+    return number & np.int64((1 << count) - 1 if count < 64 else -1), slides
 
 
 def sides_of(model: Model, side: np.ndarray) -> list[np.ndarray]:

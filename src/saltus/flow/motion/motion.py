@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.checks import Numbers, check_count, instants
 from saltus.errors import ParameterError, near
-from saltus.flow.motion.events import EventKind, Impacts, MotionEvents, Stop, modes_of, sides_of
+from saltus.flow.motion.events import EventKind, Impacts, MotionEvents, Stop, masks_of, modes_of, sides_of, type_of_bits
 from saltus.flow.motion.validity import DenseOutput, Validity, ValidityCheck
 from saltus.notebook import html_table
 from saltus.result import Result, provenance, table_of
@@ -374,8 +374,7 @@ def _add_contacts(motion: Motion, dataset: xarray.Dataset, side: np.ndarray) -> 
     """Add the closed contacts, the directions of frictions, and the impacts: times, contacts, positions and velocities."""
     model, impacts = motion.system.model, motion.impacts
     names, contacts = model.coordinates, [contact.name for contact in model.contacts]
-    masks = np.array([1 << i for i in range(len(contacts))], dtype=np.int16)
-    flags = {"units": "1", "flag_masks": masks, "flag_meanings": " ".join(contacts)}
+    flags = {"units": "1"} | masks_of(contacts)
     closed, slides = modes_of(model, side)
     for friction, direction in zip(model.frictions, slides, strict=True):
         text = f"direction in which {friction.name} slides, 0 where it sticks"
@@ -385,7 +384,11 @@ def _add_contacts(motion: Motion, dataset: xarray.Dataset, side: np.ndarray) -> 
         dataset[f"side_{surface.name}"] = ("time", beside.astype(np.int8), {"units": "1", "long_name": text})
     if not contacts:
         return
-    dataset["closed_contacts"] = ("time", closed.astype(np.int16), flags | {"long_name": "contacts that are closed"})
+    dataset["closed_contacts"] = (
+        "time",
+        closed.astype(type_of_bits(len(contacts))),
+        flags | {"long_name": "contacts that are closed"},
+    )
     dataset["impact_time"] = ("impact", impacts.time, {"units": "1"})
     dataset["impact_contacts"] = ("impact", impacts.side, flags | {"long_name": "contacts that were hit"})
     position = np.full((len(names), len(impacts)), np.nan)

@@ -21,7 +21,7 @@ import { roundStep } from "./numbers.js";
 
 /** @type {Record<string, (scene: Scene) => Picture>} */
 const DRAWINGS = {
-  Metainterface: reducedCell, TwoLayer: bothLayers, TwoCells: chain, ThreeCells: chain, FourCells: chain,
+  Metainterface: reducedCell, TwoLayer: bothLayers, CellChain: chain,
   RockingBlock: block, WallOscillator: atWall, TwoStops: betweenStops, ImpactPair: pair, BeltOscillator: onBelt,
 };
 

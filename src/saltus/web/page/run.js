@@ -215,7 +215,7 @@ export class Run {
       const contact = kind === "limit" ? (layout.limits[detail] ?? "") : "";
       return { time, kind, contact, side, before: [row[1] ?? 0], after: [row[2] ?? 0], impulse: [] };
     }
-    const chosen = [...contacts, ...engine.frictions].filter((_, i) => (side >> i) & 1);
+    const chosen = [...contacts, ...engine.frictions].filter((_, i) => Math.floor(side / 2 ** i) % 2 === 1);
     const both = chosen.length === 2 && contacts.length === 2 && chosen.every((name, i) => name === contacts[i]);
     const [before, after] = [row.slice(1, 1 + dof), row.slice(1 + dof, 1 + 2 * dof)];
     return { time, kind, contact: both ? "both" : chosen.join("+"), side, before, after, impulse: row.slice(1 + 2 * dof) };
