@@ -133,3 +133,36 @@ def test_a_rectifier_conducts_beyond_a_surface_of_the_voltage() -> None:
     assert np.transpose(moved) == pytest.approx(found, abs=1e-7)
     branch = saltus.continue_orbit(orbit, "load.frequency", (1.04, 1.06))
     assert len(branch.orbits) > 2
+
+
+def test_a_symmetric_harvester_has_symmetric_orbits() -> None:
+    @dataclass(frozen=True, kw_only=True)
+    class Both(Piezo):
+        @property
+        def contacts(self) -> tuple[saltus.Contact, ...]:
+            places = (("left", -1.0, 1), ("right", 1.0, -1))
+            return tuple(saltus.Contact(name=n, coordinate="x", position=s * self.stop, sign=d) for n, s, d in places)
+
+        def mirror(self, load: Any) -> Any:
+            return saltus.Load(frequency=load.frequency, ground=saltus.Harmonic(amplitude=-load.channels["ground"].amplitude))
+
+    orbit = saltus.find_orbit(shaken(Both(), 0.3), x=0.0, voltage=0.0)
+    assert orbit.symmetric
+    assert orbit.impact_count == 2
+    found = saltus.sensitivities(orbit.system, **orbit.start(), periods=1).state[:3, :3]
+    largest = np.sort(np.abs(np.linalg.eigvals(found)))[::-1]
+    assert np.abs(orbit.multipliers)[:3] == pytest.approx(largest, abs=1e-9)
+    free = saltus.find_orbit(shaken(Both(stop=9.0), 0.3), x=0.0, voltage=0.0)
+    assert free.symmetric
+    assert free.amplitude == pytest.approx(abs(linear(Piezo(), 0.3, 1.05)[0]), abs=1e-12)
+
+
+def test_a_sweep_gives_the_power_of_the_closed_form() -> None:
+    model, values = Piezo(), np.array([0.9, 1.0, 1.1])
+
+    def electric(motion: saltus.Motion) -> Any:
+        return saltus.energies(motion).power.sel(part="first_order.voltage")
+
+    sweep = saltus.frequency_sweep(shaken(model, 0.05), values, x=0.0, voltage=0.0, functions={"electric": electric})
+    x, ratio = linear(model, 0.05, values)
+    assert sweep.electric.sel(direction="up").values == pytest.approx(np.abs(ratio * x) ** 2 / 2.8, rel=1e-7)
