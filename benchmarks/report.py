@@ -7,6 +7,8 @@ from collections.abc import Iterable
 from typing import Any
 
 from equal import OURS, TARGETS, asked, at_equal_error, ratios
+from measure import equal_error
+from tasks.one_motion import CODES, PERIODS
 
 
 def report(results: dict[str, Any]) -> str:
@@ -18,6 +20,7 @@ def report(results: dict[str, Any]) -> str:
         _asked(results),
         _equal_error(work),
         "![time against error, and throughput](benchmarks.png)",
+        _one_motion(results.get("one_motion")),
         _throughput(results["throughput"]),
         _derivatives(results["derivatives"]),
         _fits(results.get("fits")),
@@ -77,6 +80,40 @@ def _equal_error(work: list[dict[str, Any]]) -> str:
         "Microseconds of processor time for a trajectory-period, and in brackets how many times that of "
         f"{ours}. The error is the largest over sixteen motions whose ends are known to 25 digits; times are interpolated in "
         "log-log between the tolerances of each code.\n\n" + table(("code", *(f"{t:.0e}" for t in TARGETS)), rows)
+    )
+
+
+MOST = {1: 2.0, 20: 1.0, 1000: 1.0}  # what one motion may take of heyoka's time, by its periods
+LOOSE = (1e-6, 1e-8, 1e-10, 1e-12)
+
+
+def _one_motion(rows: list[dict[str, Any]] | None) -> str:
+    if not rows:
+        return ""
+    codes, times = list(dict.fromkeys(row["code"] for row in rows)), dict[tuple[str, int], Any]()
+    for code in codes:
+        for periods in PERIODS:
+            own = [row for row in rows if (row["code"], row["periods"]) == (code, periods)]
+            times[code, periods] = equal_error([row["error"] for row in own], [row["least"] for row in own], LOOSE)
+
+    def cell(code: str, periods: int, i: int) -> str:
+        own, theirs = times[code, periods][i], times[CODES[0], periods][i]
+        return number(own) + (f" ({number(own / theirs, 2)}x)" if code != CODES[0] else "")
+
+    cells = [
+        [
+            str(periods),
+            code,
+            *(cell(code, periods, i) for i in range(len(LOOSE))),
+            f"{MOST[periods]:g}x" if code == CODES[1] else "",
+        ]
+        for periods in PERIODS
+        for code in codes
+    ]
+    return (
+        "## One motion beside heyoka.py's scalar code, at equal achieved error\n\nMicroseconds of processor time for a call, the "
+        "least of all rounds, and in brackets how many times that of heyoka.py, whose integrator is made once and used again.\n\n"
+        + table(("periods", "code", *(f"{t:.0e}" for t in LOOSE), "asked: at most"), cells)
     )
 
 

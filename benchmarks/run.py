@@ -24,6 +24,7 @@ from report import report
 from siconos import beside_siconos
 from tasks.derivatives import derivative_cost
 from tasks.fitting import fits
+from tasks.one_motion import one_motion
 from tasks.process import run_child
 from tasks.smoothed import paper_way
 from tasks.startup import startup
@@ -42,6 +43,7 @@ def measure(peers: list[Peer], rounds: int, quick: bool) -> dict[str, Any]:
     """Every task, each with a line that says how long it took."""
     tasks = {
         "work": lambda: work_precision(peers, rounds, quick),
+        **({"one_motion": lambda: one_motion(rounds)} if any(p.module == "heyoka_scalar" for p in peers) else {}),
         "throughput": lambda: throughput(peers, min(rounds, 3), quick),
         "derivatives": lambda: derivative_cost(peers, rounds),
         "fits": lambda: fits(rounds),

@@ -16,6 +16,7 @@ sys.path.insert(0, str(BENCHMARKS))
 equal, measure, reference, report = (__import__(name) for name in ("equal", "measure", "reference", "report"))
 from auto import case, diagram, exact, program, section, verdicts  # noqa: E402
 from peers.peer import AbsentError  # noqa: E402
+from tasks import one_motion  # noqa: E402
 
 ERRORS = np.array([1e-4, 1e-6, 1e-9, 1e-13])
 
@@ -62,6 +63,20 @@ def test_ratios_and_verdicts_follow_from_the_times() -> None:
     assert math.isnan(found[equal.TARGETS.index(1e-14)])
     (line,) = equal.asked({"work": lanes + heyoka, "startup": []})
     assert line == ("at equal error at least 5 times heyoka.py batch", "4 to 8 times", "no")
+
+
+def test_one_motion_is_compared_at_equal_error_and_beside_what_it_was() -> None:
+    times = {"heyoka.py scalar": 10.0, "saltus": 15.0, "saltus at ff7e16c": 40.0}
+    rows = [
+        {"code": code, "periods": n, "tol": tol, "error": tol, "least": n * least * (1.0 - 0.1 * math.log10(tol))}
+        for code, least in times.items()
+        for n in one_motion.PERIODS
+        for tol in (1e-6, 1e-12)
+    ]
+    lines = report._one_motion(rows).splitlines()
+    (line,) = (line for line in lines if line.startswith("| 20 | saltus |"))
+    assert line == "| 20 | saltus | 480 (1.5x) | 540 (1.5x) | 600 (1.5x) | 660 (1.5x) | 1x |"
+    assert "| 1 | saltus at ff7e16c | 64.0 (4.0x) |" in "\n".join(lines)
 
 
 @pytest.mark.parametrize(("x", "text"), [(0.0, "0"), (1.2345, "1.23"), (12345.6, "12,346"), (1e-9, "1.00e-09"), (math.nan, "-")])
