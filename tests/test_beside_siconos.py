@@ -2,10 +2,14 @@
 
 import ctypes
 import sys
+from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
+
+import saltus
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 from peers.peer import AbsentError
@@ -56,6 +60,61 @@ def test_siconos_comes_to_our_motions_at_first_order() -> None:
         assert errors[-1] < 2e-3
         steps = [{"step": one.duration / count, "error": error} for count, error in zip(counts, errors, strict=True)]
         assert 0.7 < beside.order(steps) < 1.4
+
+
+@dataclass(frozen=True, kw_only=True)
+class Heap(saltus.ContactModel):
+    """Three bodies on a line over a floor, with springs between neighbours, and gravity."""
+
+    stiffness: float = 4.0
+    size: float = 0.2
+
+    coordinates: ClassVar[tuple[str, ...]] = ("a", "b", "c")
+    masses: ClassVar[tuple[float, ...]] = (1.0, 0.6, 1.7)
+
+    @property
+    def contacts(self):
+        floor = saltus.Contact(name="floor", coordinate="a", position=self.size)
+        return floor, *(
+            saltus.Contact(name=high + low, coordinate={high: 1.0, low: -1.0}, position=self.size) for low, high in ("ab", "bc")
+        )
+
+    def mass_matrix(self, q):
+        return np.diag(self.masses).tolist()
+
+    def force(self, t, q, velocity, load):
+        pulls = [self.stiffness * (q[1] - q[0]), self.stiffness * (q[2] - q[1])]
+        first, second, third = self.masses
+        return pulls[0] - first, pulls[1] - pulls[0] - second, -pulls[1] - third
+
+
+@pytest.mark.parametrize("e", [(0.7, 0.7, 0.7), (0.0, 0.3, 0.0), (0.9, 0.9, 0.9), (0.8, 0.0, 0.5)])
+def test_siconos_comes_to_our_motions_of_bodies_that_touch_at_first_order(e: tuple[float, ...]) -> None:
+    counts, duration = (1000, 2000, 4000, 8000, 16000), 0.9
+    begin, speeds = (0.5, 1.1, 1.6), (-1.0, 0.3, -0.5)
+    task = {
+        "mass": np.diag(Heap.masses).tolist(),
+        "stiffness": (4.0 * np.array([[1, -1, 0], [-1, 2, -1], [0, -1, 1]])).tolist(),
+        "force": [-mass for mass in Heap.masses],
+        "rows": [[1, 0, 0], [-1, 1, 0], [0, -1, 1]],
+        "offsets": [-0.2] * 3,
+        "e": e,
+        "position": begin,
+        "velocity": speeds,
+        "duration": duration,
+        "rounds": 1,
+    }
+    try:
+        answers = program.march([task | {"steps": count} for count in counts])
+    except AbsentError as reason:
+        pytest.skip(str(reason))
+    system = saltus.System(model=Heap(), impact=saltus.NewtonImpact(e=e))
+    motion = saltus.simulate(system, **dict(zip("abc", begin, strict=True)), velocity=speeds, duration=duration)
+    assert {event.contact for event in motion.events} >= {"floor", "ba", "cb"}
+    errors = [float(np.abs(np.array(answer["state"]) - motion.final_state).max()) for answer in answers]
+    assert errors[-1] < 1e-3
+    steps = [{"step": duration / count, "error": error} for count, error in zip(counts, errors, strict=True)]
+    assert 0.7 < beside.order(steps) < 1.4
 
 
 def test_the_times_at_equal_error_are_those_of_power_laws(tmp_path: Path) -> None:

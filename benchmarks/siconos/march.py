@@ -1,4 +1,4 @@
-"""Motions of both layers by Siconos, for the Python that has it: march.py EQUATIONS TASKS ANSWERS, two files of JSON.
+"""Motions of both layers and of bodies by Siconos, for the Python that has it: march.py EQUATIONS TASKS ANSWERS, files of JSON.
 
 Moreau and Jean's time stepping with theta = 1/2, Newton's method in each step, a linear complementarity problem for the impulses.
 The loop over steps is Siconos' own, in C++; seconds are processor time of that loop alone. Nothing of saltus is imported here.
@@ -17,6 +17,11 @@ def march(equations, task):
     """The state at the end, and the seconds of each round."""
     seconds = []
     for _ in range(task["rounds"]):
+        if "mass" in task:
+            bodies, model = linear_bodies(task)
+            simulation = time_stepping(model, task)
+            simulation.run()
+            return {"state": [*bodies.q(), *bodies.velocity()]}
         layers = sk.LagrangianDS(np.array(task["opening"]), np.array(task["velocity"]))
         layers.setzPtr(np.array(task["numbers"]))
         layers.setComputeMassFunction(equations, "mass")
@@ -27,14 +32,33 @@ def march(equations, task):
         model.insertDynamicalSystem(layers)
         for row, e in zip(np.eye(2), task["e"], strict=True):
             model.link(sk.Interaction(sk.NewtonImpactNSL(e), sk.LagrangianLinearTIR(row[None, :])), layers)
-        steps = sk.TimeDiscretisation(0.0, task["duration"] / task["steps"])
-        simulation = sk.TimeStepping(model, steps, sk.MoreauJeanOSI(0.5), sk.LCP())
-        simulation.setNewtonTolerance(1e-12)
-        simulation.setNewtonMaxIteration(20)
+        simulation = time_stepping(model, task)
         start = time.process_time()
         simulation.run()
         seconds.append(time.process_time() - start)
     return {"state": [*layers.q(), *layers.velocity()], "time": simulation.startingTime(), "seconds": seconds}
+
+
+def time_stepping(model, task):
+    """Moreau and Jean's scheme for a model."""
+    steps = sk.TimeDiscretisation(0.0, task["duration"] / task["steps"])
+    simulation = sk.TimeStepping(model, steps, sk.MoreauJeanOSI(0.5), sk.LCP())
+    simulation.setNewtonTolerance(1e-12)
+    simulation.setNewtonMaxIteration(20)
+    return simulation
+
+
+def linear_bodies(task):
+    """M q'' + K q = f with the gaps H q + b >= 0, a row each, and their restitution."""
+    mass, stiffness, force = (np.array(task[name], dtype=float) for name in ("mass", "stiffness", "force"))
+    bodies = sk.LagrangianLinearTIDS(np.array(task["position"]), np.array(task["velocity"]), mass, stiffness, 0.0 * mass)
+    bodies.setFExtPtr(force)
+    model = sk.NonSmoothDynamicalSystem(0.0, task["duration"])
+    model.insertDynamicalSystem(bodies)
+    for row, offset, e in zip(task["rows"], task["offsets"], task["e"], strict=True):
+        relation = sk.LagrangianLinearTIR(np.array([row], dtype=float), np.array([offset], dtype=float))
+        model.link(sk.Interaction(sk.NewtonImpactNSL(e), relation), bodies)
+    return bodies, model
 
 
 if __name__ == "__main__":
