@@ -68,15 +68,15 @@ def test_ratios_and_verdicts_follow_from_the_times() -> None:
 def test_one_motion_is_compared_at_equal_error_and_beside_what_it_was() -> None:
     times = {"heyoka.py scalar": 10.0, "saltus": 15.0, "saltus at ff7e16c": 40.0}
     rows = [
-        {"code": code, "periods": n, "tol": tol, "error": tol, "least": n * least * (1.0 - 0.1 * math.log10(tol))}
+        {"code": code, "periods": n, "tol": tol, "error": tol, "least": n * least * tol ** (-1 / 6)}
         for code, least in times.items()
         for n in one_motion.PERIODS
         for tol in (1e-6, 1e-12)
     ]
     lines = report._one_motion(rows).splitlines()
     (line,) = (line for line in lines if line.startswith("| 20 | saltus |"))
-    assert line == "| 20 | saltus | 480 (1.5x) | 540 (1.5x) | 600 (1.5x) | 660 (1.5x) | 1x |"
-    assert "| 1 | saltus at ff7e16c | 64.0 (4.0x) |" in "\n".join(lines)
+    assert line == "| 20 | saltus | 3,000 (1.5x) | 6,463 (1.5x) | 13,925 (1.5x) | 30,000 (1.5x) | 1x |"
+    assert "| 1 | saltus at ff7e16c | 400 (4.0x) |" in "\n".join(lines)
 
 
 @pytest.mark.parametrize(("x", "text"), [(0.0, "0"), (1.2345, "1.23"), (12345.6, "12,346"), (1e-9, "1.00e-09"), (math.nan, "-")])
