@@ -104,6 +104,7 @@ from .systems.pulses import Ramp as Ramp
 from .systems.pulses import Ricker as Ricker
 from .systems.si_units import PhysicalBlock as PhysicalBlock
 from .systems.si_units import PhysicalCell as PhysicalCell
+from .systems.structure import Structure as Structure
 from .systems.two_layer import TwoLayer as TwoLayer
 from .systems.unit_cell import UnitCell as UnitCell
 from .web.study_page import Explorer as Explorer

@@ -33,13 +33,13 @@ class Limits:
     periods: int = 10**12  # Forcing periods, or units of time, of one motion: days of one core.
     threads: int = 1024  # No machine has so many cores, and each thread takes memory before it does anything.
     value: float = 1e100  # The size of any number: differences and squares of larger numbers overflow.
+    coordinates: int = 200  # Of a structure: one of more is reduced first, as few of its modes matter.
     order: int = 1000  # The order of a harmonic: the step of the integrator shrinks with it.
     seed: int = 2**63 - 1  # The largest number that files and random generators can hold.
     motion: int = 2048  # Bytes that a motion of an ensemble takes; 1000 were measured without its samples.
     dense: int = 6000  # Bytes that a forcing period of a motion with dense output takes; 5400 were measured.
     work: float = 1e12  # Motions times forcing periods: four days of one core, at three million in a second.
-    # Loops over Taylor coefficients in a model's equations that take a minute to compile; saltus's own models have 92 at most.
-    operations: int = 600
+    operations: int = 600  # Loops over Taylor coefficients that take a minute to compile; saltus's own models have 92 at most.
     nodes: int = 100_000  # Operations of any kind in these equations that take a minute to compile.
     lanes: float = 3.0  # The factor of the time of compiling for vector lanes; 2.7 was measured.
     # The factor of the time of compiling for a system with derivatives, whose operations are counted too.

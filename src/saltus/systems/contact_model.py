@@ -136,6 +136,8 @@ class Surface:
         p, a number, which may be one of the model's parameters.
     sign
         +1 where s is +1 above the position, -1 where it is +1 below.
+    stiffness, damping
+        k and c of the force -k (q - p) - c q' that acts on the side +1, of a `Structure`; another model has it in its `force`.
 
     Examples
     --------
@@ -147,6 +149,8 @@ class Surface:
     coordinate: Any
     position: Any = 0.0
     sign: int = 1
+    stiffness: Any = 0.0
+    damping: Any = 0.0
 
     def __post_init__(self) -> None:
         if self.sign not in (1, -1):

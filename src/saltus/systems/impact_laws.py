@@ -176,6 +176,18 @@ class Factors(tuple[Any, ...]):
     __slots__ = ()
 
 
+class Coefficients(Factors):
+    """Numbers that follow from others: a trace replaces them by symbols, but they are no parameters."""
+
+    __slots__ = ()
+
+
+class NamedParts(Factors):
+    """NamedParts of a model with names of their own, whose numbers have paths such as `model.contacts.tip.position`."""
+
+    __slots__ = ()
+
+
 @dataclass(frozen=True, slots=True)
 class NewtonImpact(ImpactLaw):
     """0 <= J _|_ v+ + E v- >= 0 at all contacts whose gap is 0, with the rates v of the gaps and the impulses J (Moreau).

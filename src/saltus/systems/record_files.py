@@ -6,10 +6,13 @@ in metres, m/s, m/s^2 or newtons.
 
 from __future__ import annotations
 
+import base64
 import math
 import re
 import stat
-from collections.abc import Iterator, Sequence
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
@@ -265,3 +268,117 @@ def _quoted(text: str) -> str:
     """The beginning of a text in a sentence."""
     short = text if len(text) <= 40 else text[:37] + "..."
     return 'the text "' + short.encode("unicode_escape").decode("ascii") + '"'
+
+
+PACKED = "float64 "  # in front of the text of a matrix in a file
+
+
+class ConstantNumbers:
+    """A matrix that does not change, which is equal to another one with the same entries."""
+
+    __slots__ = ("_bytes", "array")
+
+    def __init__(self, given: Any, name: str) -> None:
+        self.array = read_array(given, name)
+        self.array.flags.writeable = False
+        self._bytes = self.array.tobytes()
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, ConstantNumbers) and (self.array.shape, self._bytes) == (other.array.shape, other._bytes)
+
+    def __hash__(self) -> int:
+        return hash(self._bytes)
+
+    def __repr__(self) -> str:
+        return f"a matrix of {' x '.join(map(str, self.array.shape))} numbers"
+
+    def __reduce__(self) -> Any:
+        return ConstantNumbers, (self.array, "matrix")
+
+    def __array__(self, dtype: Any = None, copy: Any = None) -> np.ndarray:
+        return np.array(self.array, dtype=dtype)
+
+    @property
+    def structure_key(self) -> Any:
+        """What of it belongs to a system's structure: its size."""
+        return ConstantNumbers, self.array.shape
+
+    def packed(self) -> str:
+        """Its numbers as a text, exactly; `ConstantNumbers` reads it."""
+        size = "x".join(map(str, self.array.shape))
+        return f"{PACKED}{size} {base64.b64encode(zlib.compress(self.array.astype('<f8').tobytes())).decode()}"
+
+
+def read_array(given: Any, name: str) -> np.ndarray:
+    """An array of finite numbers of its own, from numbers or from a text that `ConstantNumbers.packed` has written."""
+    try:
+        if isinstance(given, str) and given.startswith(PACKED):
+            _, size, text = given.split(" ")
+            shape = [int(number) for number in size.split("x")]
+            return np.frombuffer(zlib.decompress(base64.b64decode(text)), dtype="<f8").reshape(shape).astype(float)
+        dense = given.toarray() if hasattr(given, "toarray") else given  # a sparse matrix of SciPy
+        array = np.array(dense, dtype=float)
+    except (TypeError, ValueError, zlib.error):
+        raise ParameterError(f"{name} must be rows of numbers, got {shown(given)}", name) from None
+    if not np.isfinite(array).all():
+        raise ParameterError(f"{name} must be finite; it holds nan or inf", name)
+    return array
+
+
+def matrices_in(path: str, names: Mapping[str, Sequence[str]]) -> dict[str, Any]:
+    """The matrices in a .npz or .mat file by their names, each with what it may be called there; damping may lack."""
+    place = Path(path)
+    if place.suffix not in (".npz", ".mat"):
+        raise ParameterError(f"file must be a .npz or .mat file of matrices, got {shown(path)}", "file")
+    if not place.is_file():
+        raise ParameterError(f"there is no file {path}", "file")
+    try:
+        if place.suffix == ".npz":
+            with np.load(place, allow_pickle=False) as data:
+                arrays: dict[str, Any] = {name: data[name] for name in data.files}
+        else:
+            from scipy.io import loadmat
+
+            arrays = {name: value for name, value in loadmat(place).items() if not name.startswith("__")}
+    except (OSError, ValueError, NotImplementedError, zipfile.BadZipFile) as error:
+        raise ParameterError(f"{path} cannot be read as a {place.suffix} file: {error!s:.120}", "file") from None
+    found: dict[str, Any] = {}
+    for name, called in names.items():
+        there = [arrays[key] for key in called if key in arrays]
+        if not there and name != "damping":
+            raise ParameterError(f"{path} has no {' or '.join(called)}; it has {', '.join(arrays)}", "file")
+        found[name] = there[0] if there else None
+    return found
+
+
+def check_matrices(given: Mapping[str, np.ndarray]) -> None:
+    """Refuse matrices that are not those of a structure: its `mass`, its `stiffness` and maybe its `damping`."""
+    mass = given["mass"]
+    for name, a in given.items():
+        if a.ndim != 2 or a.shape[0] != a.shape[1] or not a.size:
+            raise ParameterError(f"{name} must be a square matrix, got one of {' x '.join(map(str, a.shape))}", name)
+        if a.shape != mass.shape:
+            raise ParameterError(f"{name} must be {len(mass)} x {len(mass)} as the mass is, got {len(a)} x {len(a)}", name)
+        if name != "damping" and np.abs(a - a.T).max() > 1e-9 * np.abs(a).max():
+            i, j = np.unravel_index(np.abs(a - a.T).argmax(), a.shape)
+            raise ParameterError(
+                f"{name} must be symmetric, got {a[i, j]:g} in row {i}, column {j} and {a[j, i]:g} in row {j}, column {i}", name
+            )
+    if len(mass) > LIMITS.coordinates:
+        raise ParameterError(
+            f"mass must have at most {LIMITS.coordinates} rows, got {len(mass)}: reduce the structure first, such as by the "
+            "method of Craig and Bampton",
+            "mass",
+        )
+    if (least := np.linalg.eigvalsh(mass)[0]) <= 0.0:
+        raise ParameterError(f"mass must be positive definite, and its least eigenvalue is {least:g}", "mass")
+
+
+def check_independent(rows: np.ndarray, local: tuple[str, ...]) -> None:
+    """Refuse local displacements of which one follows from the others."""
+    for i, name in enumerate(local):
+        size = np.linalg.norm(rows[i])
+        rest = rows[i] - (np.linalg.lstsq(rows[:i].T, rows[i], rcond=None)[0] @ rows[:i] if i else 0.0)
+        if np.linalg.norm(rest) <= 1e-9 * size:
+            why = f"follows from {', '.join(local[:i])}" if size else "is 0"
+            raise ParameterError(f"the displacement {name} {why}: contacts of one point share its name or its row", "points")

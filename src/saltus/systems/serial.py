@@ -16,7 +16,7 @@ import numpy as np
 
 from saltus.errors import ParameterError, SaltusError, near, shown
 from saltus.systems.gap_coordinates import IN_GAPS, in_gap_coordinates
-from saltus.systems.impact_laws import Factors, ImpactLaw
+from saltus.systems.impact_laws import Coefficients, Factors, ImpactLaw, NamedParts
 from saltus.systems.load import Load
 from saltus.systems.model import Count, Model, OneContactModel, check_one_contact
 from saltus.systems.signals import Constant, Harmonic, Pulse, Record, Signal, Sum, as_signal
@@ -26,6 +26,8 @@ def children(node: Any) -> dict[str, Any]:
     """The named parts of a part of a system: fields of a dataclass, channels of a load, terms of a sum, factors of a law."""
     if isinstance(node, Load):
         return {"frequency": node.frequency, **node.channels}
+    if isinstance(node, NamedParts):
+        return {part.name: part for part in node}
     if isinstance(node, (Sum, Factors)):
         return {str(i): term for i, term in enumerate(node.terms if isinstance(node, Sum) else node)}
     kind: Any = type(node)
@@ -54,8 +56,11 @@ def is_fixed(node: Any) -> bool:
     return settings.frozen and all(type(part) is float or is_fixed(part) for part in children(node).values())
 
 
-def numbers(node: Any, prefix: str = "") -> Iterator[tuple[str, float]]:
-    """Every number below `node` with its dotted path; a `Constant` is the path of its channel."""
+def numbers(node: Any, prefix: str = "", given: bool = False) -> Iterator[tuple[str, float]]:
+    """Every number below `node` with its dotted path, or all but those that follow from others; a `Constant` is the path of its
+    channel."""
+    if given and isinstance(node, Coefficients):
+        return
     if isinstance(node, Constant):
         yield prefix, node.value
         return
@@ -66,7 +71,7 @@ def numbers(node: Any, prefix: str = "") -> Iterator[tuple[str, float]]:
         elif is_number(child):
             yield path, float(child)
         elif child is not None:
-            yield from numbers(child, path)
+            yield from numbers(child, path, given)
 
 
 def replace(node: Any, changes: Mapping[str, Any], where: str = "") -> Any:
@@ -97,7 +102,7 @@ def replace(node: Any, changes: Mapping[str, Any], where: str = "") -> Any:
     if isinstance(node, Sum):
         return Sum(tuple(as_signal(part, f"{where}{name}") for name, part in parts.items()))
     if isinstance(node, Factors):
-        return Factors(parts.values())
+        return type(node)(parts.values())
     try:
         return dataclasses.replace(node, **parts)
     except SaltusError as error:
@@ -143,7 +148,7 @@ def substitute(node: Any, leaf: Callable[[str, float], Any], prefix: str = "") -
         object.__setattr__(twin, "terms", tuple(parts.values()))
         return twin
     if isinstance(node, Factors):
-        return Factors(parts.values())
+        return type(node)(parts.values())
     if not dataclasses.is_dataclass(node):
         return node
     twin = object.__new__(type(node))
@@ -163,7 +168,7 @@ class NamedTypes(UserDict[str, Any]):
 
 MODELS = NamedTypes(
     dict.fromkeys(("Metainterface", "RockingBlock", "TwoLayer", "WallOscillator", "TwoStops", "ImpactPair", "BeltOscillator"))
-    | {"CellChain": None}
+    | {"CellChain": None, "Structure": None}
 )
 IMPACTS = NamedTypes(dict.fromkeys(("VelocityReduction", "EnergyRestitution", "InelasticImpact", "NewtonImpact")))
 PULSES = NamedTypes(dict.fromkeys(("HalfSine", "OneSine", "OneCosine", "MavroeidisPapageorgiou", "Ricker", "Ramp", "Chirp")))
@@ -220,6 +225,8 @@ def to_dict(part: Any) -> Any:
         fields = {"time": part.time.tolist(), "value": part.value.tolist(), "quantity": part.quantity}
         return {**fields, "scale": part.scale, **({"source": part.source} if part.source else {})}
     kind: Any = type(part)
+    if hasattr(part, "to_table"):
+        return {"type": kind.__name__, **part.to_table()}
     fields = {name: getattr(part, name) for name in _fields_of(kind)}
     fields = {name: value for name, value in fields.items() if value is not None}
     return fields if isinstance(part, Signal) and not isinstance(part, Pulse) else {"type": kind.__name__, **fields}

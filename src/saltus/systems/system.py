@@ -143,7 +143,7 @@ class System:
     @property
     def parameters(self) -> dict[str, float]:
         """Every number of the system by its dotted path."""
-        return dict(numbers(self))
+        return dict(numbers(self, given=True))
 
     @property
     def in_gap_coordinates(self) -> System:

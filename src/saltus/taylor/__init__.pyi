@@ -16,6 +16,7 @@ from .generated import load_functions as load_functions
 from .generated import structure_key as structure_key
 from .graph import RECORD_WIDTH as RECORD_WIDTH
 from .graph import Expr as Expr
+from .graph import check_size as check_size
 from .graph import combine as combine
 from .graph import differentiate as differentiate
 from .graph import is_steep as is_steep
@@ -46,5 +47,4 @@ from .rules import FUNCTIONS as FUNCTIONS
 from .series import Rows as Rows
 from .tracing import FREQUENCY as FREQUENCY
 from .tracing import Trace as Trace
-from .tracing import check_size as check_size
 from .tracing import trace as trace

@@ -372,6 +372,8 @@ def _key(node: Any) -> Any:
     if isinstance(node, Record):  # its samples and its scale are numbers; the file that they came from does not matter
         return Record, node.quantity
     parts, kind = children(node), type(node)
+    if hasattr(kind, "structure_key"):  # of what holds numbers that are no fields
+        return node.structure_key
     if parts:
         named = [(name, float if type(part) is float else _key(part)) for name, part in parts.items()]
         return kind, _values(_outside(kind)), tuple(named)

@@ -10,12 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from saltus.checks import LIMITS
 from saltus.errors import SaltusError, TraceError
 from saltus.taylor.rules import FUNCTIONS
 
 # The operations without Taylor recurrence that a reset may use, because it is evaluated at one instant only.
 POINTWISE = ("greater", "less", "greater_equal", "less_equal", "where", "maximum", "minimum")
 LEAVES = ("number", "parameter", "time", "origin", "side", "free", "slide", "coordinate", "velocity", "acceleration", "record")
+LEAVES += ("form", "mode")  # sums over modes, and the accelerations of modes (see `memory.py`)
 RECORD_WIDTH = 5  # coefficients of a record's piece: a cubic spline of velocity makes a quartic displacement
 
 ALLOWED = (
@@ -160,7 +162,7 @@ def uses_velocity(*operands: Any) -> bool:
 
 def _degree(op: str, args: tuple[Expr, ...]) -> int | None:
     """The degree in the time of the node's Taylor series, or None where it does not end."""
-    if op in ("coordinate", "velocity", "acceleration"):
+    if op in ("coordinate", "velocity", "acceleration", "form", "mode"):
         return None
     if op in LEAVES:
         return {"time": 1, "record": RECORD_WIDTH - 1}.get(op, 0)
@@ -352,3 +354,24 @@ def ask(model: Any, method: str, *arguments: Any) -> Any:
     except BaseException as error:  # a user's own code may call exit
         name = f"{type(model).__name__}.{method}"
         raise TraceError(f"{name} failed while it was traced: {type(error).__name__}: {error}") from error
+
+
+def check_size(traced: Any, lanes: bool = False) -> None:
+    """Refuse equations whose compilation would take minutes or hours; the time grows as the square of the number of loops.
+
+    Raises
+    ------
+    TraceError
+        The message has the estimate for one motion, for its derivatives if they are traced, or for vector `lanes`.
+    """
+    expanded = [*traced.acceleration, *traced.reactions, *traced.margins.values(), *([] if traced.gap is None else [traced.gap])]
+    loops, nodes = loop_count(expanded), len(ordered(expanded))
+    minutes = max(loops / LIMITS.operations, nodes / LIMITS.nodes) ** 2
+    minutes *= (LIMITS.derivatives if traced.columns else 1.0) * (LIMITS.lanes if lanes else 1.0)
+    most = LIMITS.compiling if traced.columns or lanes else 1.0
+    if minutes > most:
+        what = f"{traced.model} with {traced.columns} columns of derivatives" if traced.columns else traced.model
+        raise TraceError(
+            f"the equations of {what} have {nodes} operations, {loops} of them functions, products and quotients, which would "
+            f"take about {minutes:.2g} minutes to compile{' for an ensemble' * lanes}; what takes more than {most:g} is refused"
+        )

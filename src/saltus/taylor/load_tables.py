@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from saltus.errors import TraceError
 from saltus.systems import Pulse, Record, System, substitute
-from saltus.taylor.graph import RECORD_WIDTH
+from saltus.taylor.graph import RECORD_WIDTH, Expr, combine
 from saltus.taylor.kernels import jit
 
 SINCE, WITHIN, AFTER = 0, 1, 10
@@ -103,6 +104,46 @@ def _fill(row: np.ndarray, breaks: np.ndarray, record: Record, order: int) -> No
         velocity = record.polynomials[1](edge)
         row[where, 0] = velocity if order == 1 else record.polynomials[0](edge) + velocity * (anchor - edge)
         row[where, 1] = 0.0 if order == 1 else velocity
+
+
+class LoadTime:
+    """The time in a traced model, which may be passed to load channels only.
+
+    The flow counts whole forcing periods and keeps a local time within them. A model may therefore depend on the time only
+    through its load, for which this representation is exact.
+    """
+
+    def __init__(self, trace: Any) -> None:
+        self._trace = trace
+
+    def phase(self, rate: Any, phase: Any) -> Expr:
+        """rate t + phase, for a harmonic."""
+        return combine("add", combine("mul", rate, Expr("time")), phase)
+
+    def record(self, record: Record, order: int) -> Expr:
+        """The `order`-th derivative of a record at t, times its scale."""
+        return combine("mul", record.scale, self._row(record, order))
+
+    def pulse(self, pulse: Pulse) -> tuple[Expr, Expr, Expr]:
+        """The time since the start of a pulse, at most its length; 1 within it, else 0; the time since its end."""
+        return self._row(pulse, SINCE), self._row(pulse, WITHIN), self._row(pulse, AFTER)
+
+    def _row(self, signal: Any, order: int) -> Expr:
+        row = (signal.path, order)
+        if row not in self._trace.records:
+            self._trace.records.append(row)
+        return Expr("record", (), self._trace.records.index(row))
+
+    def refuse(self, *_: Any) -> Any:
+        """Raise an error for every other use."""
+        raise TraceError(
+            "the time may only be handed to a load channel, such as load.horizontal(t); give the model a channel for it"
+        )
+
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = refuse
+    __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = __pow__ = __rpow__ = __neg__ = __pos__ = __abs__ = refuse
+    __float__ = __int__ = __bool__ = __lt__ = __gt__ = __le__ = __ge__ = __eq__ = __ne__ = __array__ = refuse
+    __hash__ = object.__hash__
 
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from saltus.taylor.graph import RECORD_WIDTH, Expr, ordered
+from saltus.taylor.graph import RECORD_WIDTH, Expr, combine, number, ordered, substitute
 from saltus.taylor.load_tables import expand_record
 from saltus.taylor.rules import FUNCTIONS
 from saltus.taylor.vectors import DOUBLE, LONG, Arithmetic, Vec
@@ -193,3 +193,126 @@ class Memory:
         index = self.builder.select(self.builder.icmp_signed("<", before, LONG(0)), LONG(0), before)
         anchor = self.load_from(self.builder.gep(self.arguments["breaks"].data, [index]))  # as `load_tables.anchor` has it
         return time + self.leaf(("origin",)) - Vec(self.builder, anchor, self.arithmetic)
+
+
+# --- many modes, whose equations are written as loops (`ModeLoops` in `rules.py`) --------------------------------------------
+
+# The modes of a linear structure obey, with coefficients that are parameters,
+#
+#     z_i'' = -w_i^2 z_i - sum_j D_ij z_j' + sum_r c_ri s_r,
+#
+# where the inputs s_r are other coordinates, their rates, or expressions such as loads. The other coordinates read of them the
+# sums sum_i k_i z_i + d_i z_i', the leaves "form" of their expressions. The columns of a tangent obey the same equations.
+
+
+class ModeSum(NamedTuple):
+    """A sum over modes: where the coefficients of their amplitudes and of their rates begin among the parameters."""
+
+    amplitudes: int
+    rates: int | None  # None: the sum has none
+    first: int  # the coordinate that is the first mode, of the motion or of a column of its tangent
+    count: int
+
+    def written_out(self) -> Expr:
+        """The sum as an expression."""
+        total = number(0.0)
+        for start, op in ((self.amplitudes, "coordinate"), (self.rates, "velocity")):
+            for i in range(self.count if start is not None else 0):
+                total = total + Expr("parameter", (), start + i) * Expr(op, (), self.first + i)
+        return total
+
+
+class ModeInput(NamedTuple):
+    """An input of all modes: sign times coefficients, which are parameters, times a coordinate, a rate or an expression."""
+
+    of: Expr
+    start: int
+    stride: int
+    sign: float
+
+    @property
+    def local(self) -> bool:
+        """Whether it is a coordinate or its rate, in place of which a column of the tangent has its own."""
+        return self.of.op in ("coordinate", "velocity")
+
+
+@dataclass(frozen=True)
+class ModeBlock:
+    """The modes of a traced structure."""
+
+    first: int  # the coordinate that is the first of them
+    count: int
+    squares: int  # where w^2 begins among the parameters
+    damping: int | None  # where D begins
+    coupled: bool  # whether D has rows, or its diagonal alone
+    forms: tuple[ModeSum, ...]
+    inputs: tuple[ModeInput, ...]
+    columns: tuple[tuple[ModeInput, ...], ...] = ()  # of each column of the tangent, besides the inputs that are local
+
+    @property
+    def dof(self) -> int:
+        """The number of all coordinates of the structure."""
+        return self.first + self.count
+
+    @property
+    def expressions(self) -> list[Expr]:
+        """The inputs that are expressions, of the motion and then of the columns."""
+        return [each.of for each in (*self.inputs, *(x for column in self.columns for x in column)) if not each.local]
+
+    def written_out(self, place: int) -> Expr:
+        """The acceleration at a place among all coordinates, those of the columns included, as an expression."""
+        column, own = divmod(place, self.dof)
+        base, i = column * self.dof, own - self.first
+        total = -(Expr("parameter", (), self.squares + i) * Expr("coordinate", (), place))
+        if self.damping is not None:
+            for k in range(self.count) if self.coupled else [i]:
+                at = self.damping + (i * self.count + k if self.coupled else i)
+                total = total - Expr("parameter", (), at) * Expr("velocity", (), base + self.first + k)
+        for each in (*self.inputs, *(self.columns[column - 1] if column else ())):
+            if column and not each.local and each in self.inputs:
+                continue
+            of = Expr(each.of.op, (), base + each.of.value) if each.local else each.of
+            total = total + each.sign * (Expr("parameter", (), each.start + each.stride * i) * of)
+        return total
+
+
+class LocalPart(tuple[Expr, ...]):
+    """The local coordinates of a structure, or their rates, for its equations with the modes in loops (see `memory.py`)."""
+
+    first: int  # the coordinate that is the first mode
+    sums: list[ModeSum]
+
+    def sum_over_modes(self, amplitudes: Any, rates: Any = None) -> Expr:
+        """The sum over modes of coefficients, which are parameters that follow one another, times amplitudes and rates."""
+        form = ModeSum(amplitudes[0].value, None if rates is None else rates[0].value, self.first, len(amplitudes))
+        self.sums += [] if form in self.sums else [form]
+        return Expr("form", (), form)
+
+
+def local_parts(q: Any, v: Any, local: int) -> tuple[LocalPart, LocalPart]:
+    """The local coordinates and their rates."""
+    parts, sums = (LocalPart(q[:local]), LocalPart(v[:local])), list[ModeSum]()
+    for part in parts:
+        part.first, part.sums = local, sums
+    return parts
+
+
+def mode_block(equations: Any, first: int, sums: Sequence[ModeSum]) -> ModeBlock:
+    """The modes from what a model answers to `mode_equations`, whose coefficients are parameters."""
+    squares, damping, given = equations
+    inputs = [ModeInput(combine("add", of, 0.0), start.value, stride, sign) for of, start, stride, sign in given]
+    known = tuple(each for each in inputs if each.of is not number(0.0))
+    coupled = damping is not None and len(damping) > len(squares)
+    place = None if damping is None else damping[0].value
+    return ModeBlock(first, len(squares), squares[0].value, place, coupled, tuple(sums), known)
+
+
+def without_modes(root: Expr, block: ModeBlock) -> Expr:
+    """An expression in which no sums over modes, and no accelerations of modes, are leaves."""
+    leaves: dict[Expr, Any] = {}
+    for node in ordered([root]):
+        if node.op == "form":
+            leaves[node] = node.value.written_out()
+        if node.op == "mode":
+            leaves[node] = block.written_out(node.value)
+    return substitute(root, leaves) if leaves else root

@@ -12,13 +12,15 @@ table and compare each function's coefficients with 40 digits (tests/taylor/test
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from llvmlite import ir
 
-from saltus.taylor.vectors import LONG, Coefficient, Vec, add, multiply, subtract
+from saltus.taylor.vectors import CACHE_LINE, LONG, Coefficient, Vec, add, multiply, subtract
 
 if TYPE_CHECKING:
     from saltus.taylor.series import Series
@@ -189,3 +191,194 @@ class InnerLoop:
         for variable, start, value in [(self._j, LONG(1), following), *self._changing]:
             variable.add_incoming(start, before)
             variable.add_incoming(value, self.block)
+
+
+@dataclass(frozen=True)
+class ModeRows:
+    """Where the series of modes lie: the places of the first coordinate's, and how many columns have accelerations kept."""
+
+    block: Any  # the `ModeBlock`
+    positions: tuple[str, int]
+    velocities: tuple[str, int]
+    accelerations: tuple[str, int]
+    columns: int  # of the tangent
+    kept: int  # 1 + the number of columns whose accelerations are kept
+
+
+class ModeLoops:
+    """Writes the loops over modes at each order of a series."""
+
+    def __init__(self, series: Any, rows: ModeRows, inputs: list[Any]) -> None:
+        self.series, self.rows, self.block, self.b = series, rows, rows.block, series.builder
+        self._carried: list[Vec] = []
+        self._inputs = dict(zip(self.block.expressions, inputs, strict=True))  # their rows
+        memory = series.memory
+        self._rows = [memory.pointer(place) for place in (rows.positions, rows.velocities, rows.accelerations)]
+        array = memory.arguments[rows.positions[0]]
+        self._stride = LONG(series.layout.capacity) if len(array.shape) == 1 else array.shape[1]
+        self._parameters = memory.pointer(memory.leaves["parameter"])
+        with self.b.goto_entry_block():
+            self._sums = self.b.alloca(self._one.value.type, max(1, len(self.block.forms) * (1 + rows.columns)))
+        self._sums.align = min(CACHE_LINE, 8 * memory.arithmetic.width)
+
+    def begin(self) -> None:
+        """Put the state at the start into the series, where it is given elsewhere."""
+        leaves = self.series.memory.leaves
+        for which, kind in enumerate(("coordinate", "velocity")):
+            if kind in leaves:
+                given = self.series.memory.pointer(leaves[kind])
+                for base in range(0, (1 + self.rows.columns) * self.block.dof, self.block.dof):
+                    with self._loop(0, self.block.count) as i:
+                        row = self.b.add(LONG(base + self.block.first), i)
+                        self._store(self._place(which, row, LONG(0)), self._load(self.b.gep(given, [row])))
+
+    def sums(self) -> None:
+        """Compute all sums over modes at this order."""
+        forms, b = self.block.forms, self.b
+        if not forms:
+            return
+        with self._loop(0, 1 + self.rows.columns) as j:
+            base = b.add(b.mul(j, LONG(self.block.dof)), LONG(self.block.first))
+            for f, form in enumerate(forms):
+                parts = [(0, form.amplitudes)] + ([] if form.rates is None else [(1, form.rates)])
+                total = self._total(form.count, [(which, start, base) for which, start in parts])
+                self._store(b.gep(self._sums, [b.add(b.mul(j, LONG(len(forms))), LONG(f))]), total)
+
+    def value(self, form: Any) -> Vec:
+        """One of these sums."""
+        column, own = (form.first - self.block.first) // self.block.dof, form._replace(first=self.block.first)
+        return self._load(self.b.gep(self._sums, [LONG(column * len(self.block.forms) + self.block.forms.index(own))]))
+
+    def advance(self) -> None:
+        """Compute the accelerations of all modes at this order, and integrate them."""
+        self._columns(0, 1, [each for each in self.block.inputs if not each.local])
+        begin, extra = 1, self.block.columns
+        for column in range(1, 1 + self.rows.columns):
+            if extra and extra[column - 1]:
+                self._columns(begin, column, [])
+                self._columns(column, column + 1, list(extra[column - 1]))
+                begin = column + 1
+        self._columns(begin, 1 + self.rows.columns, [])
+
+    def _columns(self, begin: int, end: int, more: list[Any]) -> None:
+        """The modes of some columns, with inputs that are expressions."""
+        if begin >= end:
+            return
+        b, block, series = self.b, self.block, self.series
+        values = [(each, series.now(self._inputs[each.of])) for each in more]
+        given = [(each, self._lifted(value)) for each, value in values if value is not None]
+        inverse = series._divided(self._one, 1)
+        with self._loop(begin, end) as j:
+            base = b.mul(j, LONG(block.dof))
+            local = [
+                (
+                    each,
+                    self._load(self._place(int(each.of.op == "velocity"), b.add(base, LONG(each.of.value)), self._order)),
+                )
+                for each in block.inputs
+                if each.local
+            ]
+            first = b.add(base, LONG(block.first))
+            with self._loop(0, block.count) as i:
+                row = b.add(first, i)
+                amplitude, rate = (self._load(self._place(which, row, self._order)) for which in (0, 1))
+                total = -(self._parameter(LONG(block.squares), i) * amplitude)
+                if block.damping is not None and block.coupled:
+                    start = b.add(LONG(block.damping), b.mul(i, LONG(block.count)))
+                    total = total - self._total(block.count, [(1, start, first)])
+                elif block.damping is not None:
+                    total = total - self._parameter(LONG(block.damping), i) * rate
+                for each, value in (*given, *local):
+                    factor = self._parameter(LONG(each.start), b.mul(i, LONG(each.stride)))
+                    total = factor.fma(value if each.sign > 0.0 else -value, total)
+                if begin < self.rows.kept:
+                    self._store(self._place(2, row, self._order), total)
+                following = b.add(self._order, LONG(1))
+                self._store(self._place(1, row, following), total * inverse)
+                self._store(self._place(0, row, following), rate * inverse)
+
+    @property
+    def _order(self) -> Any:
+        """This order, as LLVM's number."""
+        order, ahead = self.series.order, self.series.ahead
+        return LONG(order) if ahead is None else self.b.add(order, LONG(ahead))
+
+    @property
+    def _one(self) -> Vec:
+        return self.series.memory.arithmetic.number(self.b, 1.0)
+
+    def _lifted(self, value: Any) -> Vec:
+        return value if isinstance(value, Vec) else self.series.memory.arithmetic.number(self.b, value)
+
+    def _place(self, which: int, row: Any, index: Any) -> Any:
+        """LLVM's pointer to a coefficient of a coordinate (0), of its rate (1) or of its acceleration (2)."""
+        return self.b.gep(self._rows[which], [self.b.add(self.b.mul(row, self._stride), index)])
+
+    def _parameter(self, start: Any, i: Any) -> Vec:
+        return self._load(self.b.gep(self._parameters, [self.b.add(start, i)]))
+
+    def _load(self, pointer: Any) -> Vec:
+        return Vec(self.b, self.series.memory.load_from(pointer), self.series.memory.arithmetic)
+
+    def _store(self, pointer: Any, value: Vec) -> None:
+        self.b.store(value.value, pointer).align = 8
+
+    def _total(self, count: int, parts: list[tuple[int, Any, Any]]) -> Vec:
+        """The sum over modes of coefficients, from a start on, times coordinates or rates, from a row on."""
+        with self._loop(0, count, carried=True) as (i, before):
+            total = before
+            for which, start, base in parts:
+                begin = LONG(start) if isinstance(start, int) else start
+                total = self._parameter(begin, i).fma(self._load(self._place(which, self.b.add(base, i), self._order)), total)
+            self._carried.append(total)
+        return self._carried.pop()
+
+    @contextmanager
+    def _loop(self, begin: int, end: int, carried: bool = False) -> Iterator[Any]:
+        """A loop over whole numbers; with `carried` a number that begins with 0 goes through it, whose next value is put last
+        into `_carried` by the code within."""
+        b, before = self.b, self.b.block
+        body = b.append_basic_block("modes")
+        b.branch(body)
+        b.position_at_end(body)
+        i = b.phi(LONG)
+        i.add_incoming(LONG(begin), before)
+        if carried:
+            zero = self.series.memory.arithmetic.number(b, 0.0)
+            total = b.phi(zero.value.type)
+            total.add_incoming(zero.value, before)
+            yield i, Vec(b, total, self.series.memory.arithmetic)
+            total.add_incoming(self._carried[-1].value, b.block)
+        else:
+            yield i
+        following = b.add(i, LONG(1))
+        i.add_incoming(following, b.block)
+        after = b.append_basic_block("after")
+        b.cbranch(b.icmp_signed("<", following, LONG(end)), body, after)
+        b.position_at_end(after)
+
+
+def needs_sums(op: str, degrees: list[int | None]) -> bool:
+    """Whether an operation multiplies two series neither of which ends."""
+    if op == "mul":
+        return degrees[0] is None and degrees[1] is None
+    return op == "sqrt" or (op not in ("add", "sub") and degrees[-1 if op == "div" else 0] is None)
+
+
+def constant_table(builder: Any, numbers: list[float]) -> Any:
+    """LLVM's pointer to an array of constants in the compiled code."""
+    values = ir.Constant(ir.ArrayType(ir.DoubleType(), len(numbers)), numbers)
+    module = builder.module
+    table = ir.GlobalVariable(module, values.type, module.get_unique_name("numbers"))
+    table.linkage, table.global_constant, table.initializer = "internal", True, values
+    return table
+
+
+def mode_loops(series: Series, roots: list[int]) -> ModeLoops | None:
+    """The loops over modes, if there are any: the last of the roots that are kept are their inputs."""
+    rows, last = series.layout.modes, len(series.layout.roots)
+    if rows is None:
+        return None
+    loops = ModeLoops(series, rows, [series.rows[root] for root in roots[last - len(rows.block.expressions) : last]])
+    loops.begin()
+    return loops

@@ -16,11 +16,20 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
-from llvmlite import ir
-
 from saltus.taylor.graph import LEAVES, RECORD_WIDTH, degree
 from saltus.taylor.memory import Memory, Node, Place, Tape
-from saltus.taylor.rules import ARITHMETIC, FUNCTIONS, SETTINGS, InnerLoop, Row, by_slope
+from saltus.taylor.rules import (
+    ARITHMETIC,
+    FUNCTIONS,
+    SETTINGS,
+    InnerLoop,
+    ModeRows,
+    Row,
+    by_slope,
+    constant_table,
+    mode_loops,
+    needs_sums,
+)
 from saltus.taylor.vectors import CACHE_LINE, DOUBLE, LONG, Coefficient, Vec, add, dot, multiply, subtract
 
 
@@ -41,6 +50,8 @@ class Rows:
     any_order: bool
     numbers: Sequence[Place] = ()  # where further roots that do not change are stored
     first_order: Sequence[int] = ()  # the positions of first order
+    coordinates: Sequence[int] | None = None  # those whose positions these are, if they are not all
+    modes: ModeRows | None = None  # the others, whose inputs are the last of the roots
 
 
 class Series:
@@ -50,8 +61,10 @@ class Series:
         self.memory, self.builder, self.nodes, self.layout = memory, memory.builder, tape.nodes, layout
         self.order: Any = 0  # a number among the first orders, then LLVM's number k of a pair
         self.ahead: int | None = None  # of a pair: 0 at order k, 1 at order k + 1; None among the first
-        self.positions = [Row(None, True, place=memory.pointer(place)) for place in layout.positions]
-        self.velocities = [Row(None, True, place=memory.pointer(place)) for place in layout.velocities]
+        own = layout.coordinates or range(len(layout.positions))
+        self.positions = {i: Row(None, True, place=memory.pointer(at)) for i, at in zip(own, layout.positions, strict=True)}
+        self.velocities = {i: Row(None, True, place=memory.pointer(at)) for i, at in zip(own, layout.velocities, strict=True)}
+        self.modes: Any = None
         self._nodes: dict[int, Node] = {}  # the node of each row, by the row's id
         self._scaled: dict[int, Row] = {}
         self._records: dict[int, Any] = {}
@@ -67,8 +80,8 @@ class Series:
         self._slopes = [(layout.velocities[i], layout.roots[i], self.rows[tape.roots[i]]) for i in layout.first_order]
         for i in layout.first_order:
             self.velocities[i] = self.rows[tape.roots[i]]
-        kept = [row for i, row in enumerate(self.velocities) if i not in layout.first_order]
-        self._integrated = [*self.positions, *kept]
+        kept = [row for i, row in self.velocities.items() if i not in layout.first_order]
+        self._integrated = [*self.positions.values(), *kept]
         highest = max((row.degree for row in self.rows if row.degree is not None), default=0)
         self.written_out = 2 * (highest // 2 + 1)  # the number of orders whose code is written out
         if not memory.arithmetic.exact:
@@ -78,19 +91,21 @@ class Series:
         op = node[0]
         if op in ("coordinate", "velocity"):
             return (self.positions if op == "coordinate" else self.velocities)[node[1]]
+        if op == "form":
+            return Row(None, False)
         if op in (*LEAVES, "constant"):
             return Row({"time": 1, "record": RECORD_WIDTH - 1}.get(op, 0), True)
         args = [self.rows[i] for i in (node[1:] if op in ARITHMETIC else node[1:2])]
         degrees = [row.degree for row in args]
         ends = degree(op, degrees)
-        early = all(row.early for row in args) and not _needs_sums(op, degrees)
+        early = all(row.early for row in args) and not needs_sums(op, degrees)
         return Row(ends if ends is None or ends <= SETTINGS.most_ending else None, early)
 
     def write_motion(self, roots: list[int]) -> None:
         """Write all orders of a motion, whose accelerations are the first roots, and put them into memory."""
         first_order = self.layout.first_order
         for rows, kind in ((self.positions, "coordinate"), (self.velocities, "velocity")):
-            for i, row in enumerate(rows):
+            for i, row in rows.items():
                 if kind == "velocity" and i in first_order:
                     continue
                 given = kind in self.memory.leaves
@@ -105,12 +120,16 @@ class Series:
         ]
         slopes = [(*(place and self.memory.pointer(place) for place in places), row) for *places, row in self._slopes]
         numbers = zip(self.layout.numbers, roots[len(self.layout.roots) :], strict=True)
+        self.modes = mode_loops(self, roots)
         for _ in self._each_order():
+            if self.modes is not None:
+                self.modes.sums()
             self._advance()
             if self.starts:
                 for place, root in numbers:
                     self.memory.store(place, self.now(self.rows[root]))
-            for i, (position, velocity, pull) in enumerate(zip(self.positions, self.velocities, pulls, strict=True)):
+            rows = zip(self.positions.items(), self.velocities.values(), pulls, strict=True)
+            for (i, position), velocity, pull in rows:
                 self._integrate(position, self.now(velocity))
                 if i not in first_order:
                     self._integrate(velocity, self.now(pull))
@@ -118,6 +137,8 @@ class Series:
                 self._write_slope(velocity, acceleration, self.now(row))
             for pointer, row in kept:
                 self._write(pointer, self.now(row))
+            if self.modes is not None:
+                self.modes.advance()
 
     # --- the orders ------------------------------------------------------------------------------------------------------------
 
@@ -172,7 +193,7 @@ class Series:
             if ended or op in ("coordinate", "velocity"):
                 continue
             if op in (*LEAVES, "constant"):
-                self.push(row, self._leaf(node))
+                self.push(row, self.modes.value(node[1]) if op == "form" else self._leaf(node))
                 continue
             with self._before_sums(row):
                 self._apply(op, row, node[1:])
@@ -375,19 +396,3 @@ class Series:
                 self._put(row.place, LONG(j), value)
         for j, value in enumerate(row.pair):
             self._put(row.place, self.builder.add(self.order, LONG(j)), value)
-
-
-def _needs_sums(op: str, degrees: list[int | None]) -> bool:
-    """Whether an operation multiplies two series neither of which ends."""
-    if op == "mul":
-        return degrees[0] is None and degrees[1] is None
-    return op == "sqrt" or (op not in ("add", "sub") and degrees[-1 if op == "div" else 0] is None)
-
-
-def constant_table(builder: Any, numbers: list[float]) -> Any:
-    """LLVM's pointer to an array of constants in the compiled code."""
-    values = ir.Constant(ir.ArrayType(ir.DoubleType(), len(numbers)), numbers)
-    module = builder.module
-    table = ir.GlobalVariable(module, values.type, module.get_unique_name("numbers"))
-    table.linkage, table.global_constant, table.initializer = "internal", True, values
-    return table

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from saltus.checks import LIMITS
 from saltus.errors import ParameterError, TraceError, near
 from saltus.systems import (
     DeclaredLoad,
     Harmonic,
     Pulse,
-    Record,
     System,
     apart,
     constrained_acceleration,
@@ -27,60 +26,22 @@ from saltus.taylor.graph import (
     POINTWISE,
     Expr,
     ask,
+    check_size,
     combine,
     differentiate,
-    loop_count,
     number,
     ordered,
     substitute,
     uses_velocity,
 )
-from saltus.taylor.load_tables import AFTER, SINCE, WITHIN
+from saltus.taylor.load_tables import LoadTime
+from saltus.taylor.memory import ModeBlock, ModeInput, local_parts, mode_block, without_modes
+from saltus.taylor.rules import ModeRows
 
 if TYPE_CHECKING:
     from fractions import Fraction
 
 FREQUENCY = "load.frequency"
-
-
-class LoadTime:
-    """The time in a traced model, which may be passed to load channels only.
-
-    The flow counts whole forcing periods and keeps a local time within them. A model may therefore depend on the time only
-    through its load, for which this representation is exact.
-    """
-
-    def __init__(self, trace: Trace) -> None:
-        self._trace = trace
-
-    def phase(self, rate: Any, phase: Any) -> Expr:
-        """rate t + phase, for a harmonic."""
-        return combine("add", combine("mul", rate, Expr("time")), phase)
-
-    def record(self, record: Record, order: int) -> Expr:
-        """The `order`-th derivative of a record at t, times its scale."""
-        return combine("mul", record.scale, self._row(record, order))
-
-    def pulse(self, pulse: Pulse) -> tuple[Expr, Expr, Expr]:
-        """The time since the start of a pulse, at most its length; 1 within it, else 0; the time since its end."""
-        return self._row(pulse, SINCE), self._row(pulse, WITHIN), self._row(pulse, AFTER)
-
-    def _row(self, signal: Any, order: int) -> Expr:
-        row = (signal.path, order)
-        if row not in self._trace.records:
-            self._trace.records.append(row)
-        return Expr("record", (), self._trace.records.index(row))
-
-    def refuse(self, *_: Any) -> Any:
-        """Raise an error for every other use."""
-        raise TraceError(
-            "the time may only be handed to a load channel, such as load.horizontal(t); give the model a channel for it"
-        )
-
-    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = refuse
-    __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = __pow__ = __rpow__ = __neg__ = __pos__ = __abs__ = refuse
-    __float__ = __int__ = __bool__ = __lt__ = __gt__ = __le__ = __ge__ = __eq__ = __ne__ = __array__ = refuse
-    __hash__ = object.__hash__
 
 
 @dataclass(eq=False)
@@ -134,6 +95,7 @@ class Trace:
     contact_coordinates: tuple[int, ...] = ()  # the coordinate that each contact holds
     ground_speeds: list[Expr] = field(default_factory=list)
     friction_coordinates: tuple[int, ...] = ()  # the coordinate of each friction, then -1 less that of each surface
+    modes: ModeBlock | None = None  # of a structure; their accelerations are leaves "mode"
 
     @property
     def first_order_rows(self) -> tuple[int, ...]:
@@ -150,6 +112,20 @@ class Trace:
         """The mass matrix, E, the positions of the contacts, the jumps and the speeds of the grounds: what events need."""
         return [*self.mass, *self.restitution, *self.positions, *self.jumps, *self.ground_speeds]
 
+    @property
+    def local_rows(self) -> list[int]:
+        """The coordinates, with those of the tangent's columns, whose accelerations are expressions of their own."""
+        return [i for i, a in enumerate(self.acceleration) if a.op != "mode"]
+
+    def mode_rows(self, places: Sequence[tuple[str, int]], kept: int) -> ModeRows | None:
+        """Where the series of modes lie: the places of those of the first coordinate, and how many columns keep accelerations."""
+        return None if self.modes is None else ModeRows(self.modes, *places, self.columns, kept)
+
+    @property
+    def inputs_of_modes(self) -> list[Expr]:
+        """The inputs of modes that are expressions."""
+        return [] if self.modes is None else self.modes.expressions
+
     def symbol(self, path: str, value: float) -> Expr:
         """The symbol of the number at a dotted path."""
         self.parameters.append(path)
@@ -163,7 +139,23 @@ class Trace:
             if (path, order + 1) not in self.records:
                 self.records.append((path, order + 1))
         for j in range(self.columns):
-            self.acceleration += [self.derivative_along(a, j) for a in own]
+            following = self.dof * (1 + j)
+            self.acceleration += [
+                Expr("mode", (), following + i) if a.op == "mode" else self.derivative_along(a, j) for i, a in enumerate(own)
+            ]
+        if self.modes is not None:
+            self.modes = replace(self.modes, columns=tuple(self._inputs_of_modes(j) for j in range(self.columns)))
+
+    def _inputs_of_modes(self, j: int) -> tuple[ModeInput, ...]:
+        """The inputs of the modes of column j that are expressions."""
+        assert self.modes is not None
+        own = [each for each in self.modes.inputs if not each.local] if j >= 2 * self.dof else []
+        slopes = [(each, self.partial_derivative(each.of, j)) for each in own]
+        return tuple(each._replace(of=slope) for each, slope in slopes if slope is not number(0.0))
+
+    def written_out(self, root: Expr) -> Expr:
+        """An expression in which no sums over modes, and no accelerations of modes, are leaves."""
+        return root if self.modes is None else without_modes(root, self.modes)
 
     def tangent_leaves(self, j: int) -> tuple[list[Expr], list[Expr]]:
         """The leaves for u and z of column j, as coordinates and velocities."""
@@ -172,10 +164,16 @@ class Trace:
 
     def derivative_along(self, root: Expr, j: int) -> Expr:
         """The derivative of an expression of the motion along column j, at a fixed time."""
-        total = self.partial_derivative(root, j)
-        for i, (u, z) in enumerate(zip(*self.tangent_leaves(j), strict=True)):
-            total = total + differentiate(root, Expr("coordinate", (), i)) * u
-            total = total + differentiate(root, Expr("velocity", (), i)) * z
+        if root.op == "number":
+            return number(0.0)
+        total, following = self.partial_derivative(root, j), self.dof * (1 + j)
+        leaves = {node for node in ordered([root]) if node.op in ("coordinate", "velocity", "form")}
+        for leaf in sorted(leaves, key=lambda leaf: (leaf.op == "form", leaf.value, leaf.op)):
+            if leaf.op == "form":
+                along = Expr("form", (), leaf.value._replace(first=leaf.value.first + following))
+            else:
+                along = Expr(leaf.op, (), leaf.value + following)
+            total = total + differentiate(root, leaf) * along
         return total
 
     def partial_derivative(self, root: Expr, j: int) -> Expr:
@@ -307,6 +305,9 @@ def _known_number(expression: Expr) -> float | Fraction | None:
 def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> list[Any]:
     """Trace the accelerations of a model with several contacts, for any choice of closed ones."""
     model, load, contacts, frictions = twin.contact_model, twin.load, twin.contact_model.contacts, twin.contact_model.frictions
+    local = getattr(model, "local_count", result.dof)
+    if local < result.dof:
+        q, v = local_parts(q, v, local)
     slides = [Expr("slide", (), k) for k in range(len(frictions) + len(model.surfaces))]
     mass = [[model.mass_matrix(q)]] if result.dof == 1 else [list(row) for row in model.mass_matrix(q)]
     if frictions and not apart(model, mass):
@@ -314,21 +315,27 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
             f"the mass matrix of {type(model).__name__} connects a coordinate with a contact to one with a friction: impacts "
             "would act on what sticks, which is not followed; choose coordinates in which it does not"
         )
-    accelerations = [Expr("acceleration", (), i) for i in range(result.dof)]
+    accelerations = [Expr("acceleration", (), i) for i in range(local)]
     holding = [f for forces in (reactions, stick_margins) for f in forces(model, t, q, v, accelerations, load, slides)]
     result.reactions = [combine("add", r, 0.0) for r in (*holding, *[1.0] * (2 * len(model.surfaces)))]
     speeds = [*(friction.ground_speed for friction in frictions), *(surface.position for surface in model.surfaces)]
     result.ground_speeds = [combine("add", speed, 0.0) for speed in speeds]
     rubbed, passed = ([model.coordinates.index(each.coordinate) for each in parts] for parts in (frictions, model.surfaces))
     result.friction_coordinates = (*rubbed, *(-1 - place for place in passed))
-    result.mass = [combine("add", entry, 0.0) for row in mass for entry in row]
+    zero, one, beyond = number(0.0), number(1.0), range(local, result.dof)
+    result.mass = [x for row in mass for x in (*(combine("add", entry, 0.0) for entry in row), *(zero for _ in beyond))]
+    result.mass += [one if i == j else zero for i in beyond for j in range(result.dof)]
     result.restitution = [combine("add", entry, 0.0) for row in twin.impact.restitution_matrix(model) for entry in row]
     result.positions = [combine("add", contact.position, 0.0) for contact in contacts]
     afters = [ask(model, "after_impact", contact.name, q, v) for contact in contacts if result.first_order]
     result.jumps = [combine("add", x, 0.0) for after in afters for x in (after if isinstance(after, (tuple, list)) else (after,))]
     result.signs = tuple(contact.sign for contact in contacts)
     result.contact_coordinates = tuple(model.coordinates.index(contact.coordinate) for contact in contacts)
-    return constrained_acceleration(model, t, q, v, load, [Expr("free", (), i) for i in range(result.dof)], slides)
+    found = constrained_acceleration(model, t, q, v, load, [Expr("free", (), i) for i in range(local)], slides)
+    if local < result.dof:
+        result.modes = mode_block(model.mode_equations(t, q, v, load), local, q.sums)
+        found += [Expr("mode", (), i) for i in range(local, result.dof)]
+    return found
 
 
 def _trace_margins(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any, side: Expr, stop_at: tuple[str, ...]) -> None:
@@ -360,27 +367,6 @@ def _check(result: Trace) -> None:
             if node.op in ("time", "record", "velocity"):
                 raise TraceError(f"{result.model}.gap may depend on the coordinate, the side and the parameters only")
     _check_abs(result, expanded)
-
-
-def check_size(traced: Trace, lanes: bool = False) -> None:
-    """Refuse equations whose compilation would take minutes or hours; the time grows as the square of the number of loops.
-
-    Raises
-    ------
-    TraceError
-        The message has the estimate for one motion, for its derivatives if they are traced, or for vector `lanes`.
-    """
-    expanded = [*traced.acceleration, *traced.reactions, *traced.margins.values(), *([] if traced.gap is None else [traced.gap])]
-    loops, nodes = loop_count(expanded), len(ordered(expanded))
-    minutes = max(loops / LIMITS.operations, nodes / LIMITS.nodes) ** 2
-    minutes *= (LIMITS.derivatives if traced.columns else 1.0) * (LIMITS.lanes if lanes else 1.0)
-    most = LIMITS.compiling if traced.columns or lanes else 1.0
-    if minutes > most:
-        what = f"{traced.model} with {traced.columns} columns of derivatives" if traced.columns else traced.model
-        raise TraceError(
-            f"the equations of {what} have {nodes} operations, {loops} of them functions, products and quotients, which would "
-            f"take about {minutes:.2g} minutes to compile{' for an ensemble' * lanes}; what takes more than {most:g} is refused"
-        )
 
 
 def _check_abs(result: Trace, expanded: list[Expr]) -> None:

@@ -78,7 +78,7 @@ class Sizes(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Structure:
+class CompiledStructure:
     """The compiled functions of a traced structure, and its sizes."""
 
     sizes: Sizes
@@ -176,14 +176,14 @@ def kernel_text(*modules: ModuleType) -> str:
     return _SIGNATURES + "".join(compiled_part(module) for module in modules)
 
 
-def load_structure(trace: Trace) -> Structure:
+def load_structure(trace: Trace) -> CompiledStructure:
     """The functions of a trace's structure."""
     made = load_functions("structure", structure_functions(trace), trace)
-    several = ("series", "matrices", "matrix_slopes", "tangent")
-    names = several if trace.several else ("series", "contact_series", "reset", "contact_damping", "tangent")
+    one_contact, several = ("contact_series", "reset", "contact_damping"), ("matrices", "matrix_slopes")
+    names = ("series", *(several if trace.several else one_contact), "tangent")
     stops, steep = len(trace.reactions) + len(trace.margins), int(is_steep(trace.acceleration))
     sizes = Sizes(len(trace.acceleration), stops, 1, trace.side_count, steep, trace.first_order, trace.dof, trace.columns)
-    return Structure(
+    return CompiledStructure(
         sizes,
         max(1, len(constants(trace))),
         tuple(made[name] for name in names),
@@ -223,16 +223,12 @@ def _function(name: str, places: Places, content: Sequence[Any]) -> WrittenFunct
 
 def constants(trace: Trace) -> dict[Expr, int]:
     """The table of constants: the parts of a structure's expressions that depend on parameters alone, with their places."""
-    roots = [*trace.acceleration, *motion_roots(trace), *_geometry(trace), *trace.contact_numbers]
-    roots += [
-        x for x in (trace.contact_acceleration, trace.next_side, trace.velocity_after, trace.contact_damping) if x is not None
-    ]
-    for _, _, changes in event_derivatives.changes(trace) if trace.columns else []:
-        roots += changes.values()
+    roots = [*trace.acceleration, *motion_roots(trace), *_geometry(trace), *trace.contact_numbers, *trace.inputs_of_modes]
+    rest = (trace.contact_acceleration, trace.next_side, trace.velocity_after, trace.contact_damping)
+    roots += [x for x in rest if x is not None]
+    roots += [x for *_, new in (event_derivatives.changes(trace) if trace.columns else []) for x in new.values()]
     roots += event_derivatives.number_slopes(trace)
-    equations = one_free(trace)
-    roots += equations.roots if equations else []
-    return shared_constants(roots)
+    return shared_constants(roots + (equations.roots if (equations := one_free(trace)) else []))
 
 
 def motion_roots(trace: Trace) -> list[Expr]:
@@ -263,14 +259,16 @@ def _geometry(trace: Trace) -> list[Expr]:
 
 def _series(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
     """The Taylor coefficients of the coordinates, velocities, accelerations, the gap and the margins from one state."""
-    rows = range(len(trace.acceleration))
-    gap = [] if trace.gap is None else [("g", 0)]
-    targets = [*(("a", i) for i in rows), *gap, *(("m", j) for j in range(len(trace.reactions) + len(trace.margins)))]
+    rows, inputs, gap = trace.local_rows, trace.inputs_of_modes, [("g", 0)] if trace.gap is not None else []
+    margins = [("m", j) for j in range(len(trace.reactions) + len(trace.margins))]
+    targets = [*(("a", i) for i in rows), *gap, *margins, *[None] * len(inputs)]
     leaves = LEAVES | _free(trace)
     places = Places(("t", "origin", "side", "env", "piece", "q", "v", "a", "g", "m", "w", "order"), leaves)
-    state = [("q", i) for i in rows], [("v", i) for i in rows]
-    layout = Rows(*state, targets, MOST_COEFFICIENTS, any_order=True, first_order=trace.first_order_rows)
-    return _function("series", places, SeriesOf(layout, tape([*trace.acceleration, *motion_roots(trace)], known, series=True)))
+    modes, first_order = trace.mode_rows((("q", 0), ("v", 0), ("a", 0)), 1 + trace.columns), trace.first_order_rows
+    parts = (*([(name, i) for i in rows] for name in ("q", "v")), targets, MOST_COEFFICIENTS)
+    layout = Rows(*parts, any_order=True, first_order=first_order, coordinates=rows, modes=modes)
+    roots = [*(trace.acceleration[i] for i in rows), *motion_roots(trace), *inputs]
+    return _function("series", places, SeriesOf(layout, tape(roots, known, series=True)))
 
 
 def _free(trace: Trace) -> dict[str, tuple[str, int]]:
@@ -289,16 +287,17 @@ def _contact_series(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
 
 
 def _matrices(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
-    """The numbers that events at contacts need (`Trace.contact_numbers`) at a state, one after the other."""
-    roots = trace.contact_numbers
+    """The numbers that events at contacts need (`Trace.contact_numbers`) at a state; with modes all but zeros."""
+    filled = {("out", i): root for i, root in enumerate(trace.contact_numbers) if not (trace.modes and root is number(0.0))}
     places = Places(("env", "piece", "state", "out"), ENV | HERE | {"velocity": ("state", len(trace.acceleration))})
-    return _function("matrices", places, [Case(tape(roots, known), [("out", i) for i in range(len(roots))])])
+    return _function("matrices", places, [Case(tape(list(filled.values()), known), list(filled))])
 
 
 def _matrix_slopes(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
     """The derivatives, along each column of the tangent, of the numbers that `matrices` fills; one column after the other."""
-    roots, leaves = event_derivatives.number_slopes(trace), ENV | HERE | {"velocity": ("state", len(trace.acceleration))}
-    cases = [Case(tape(roots, known), [("out", i) for i in range(len(roots))])] if roots else []
+    slopes, leaves = event_derivatives.number_slopes(trace), ENV | HERE | {"velocity": ("state", len(trace.acceleration))}
+    filled = {("out", i): root for i, root in enumerate(slopes) if not (trace.modes and root is number(0.0))}
+    cases = [Case(tape(list(filled.values()), known), list(filled))] if filled else []
     return _function("matrix_slopes", Places(("env", "piece", "state", "out"), leaves), cases)
 
 
@@ -316,7 +315,8 @@ def _tangent(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
     cases = []
     for kind, detail, changes in event_derivatives.changes(trace) if trace.columns else []:
         targets = [("state", starts[leaf.op] + leaf.value) for leaf in changes]
-        cases.append(Case(tape(list(changes.values()), known), targets, (("kind", int(kind)), ("detail", int(detail)))))
+        roots, when = list(map(trace.written_out, changes.values())), (("kind", int(kind)), ("detail", int(detail)))
+        cases.append(Case(tape(roots, known), targets, when))
     places = Places(("kind", "detail", "t", "origin", "side", "env", "piece", "state"), LEAVES | _free(trace) | state)
     return _function("tangent", places, cases)
 
@@ -356,7 +356,7 @@ class Program:
     """A system ready to run: its compiled kernel and its numbers."""
 
     trace: Trace
-    structure: Structure
+    structure: CompiledStructure
     env: tuple[Any, ...]  # parameters, constants, record breakpoints, record table
     model: Any  # the structure's functions and the geometry of its contact
     limits: tuple[str, ...]
@@ -385,7 +385,7 @@ def _made(system: System, asked: tuple[Any, ...]) -> Program:
     return Program(traced, structure, *structure.prepare(parameters, record_table(system, traced.records)), tuple(traced.margins))
 
 
-_structures: dict[Any, tuple[Trace, Structure]] = {}
+_structures: dict[Any, tuple[Trace, CompiledStructure]] = {}
 
 
 def limits_of(system: System, stop_at: Iterable[str]) -> tuple[str, ...]:

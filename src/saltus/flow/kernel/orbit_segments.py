@@ -52,7 +52,7 @@ class SegmentFollower:
         """The smooth motions of a model with one contact along the segments of a `SegmentRequest`, with their extremes if asked
         for; None where a segment cannot be followed.
 
-        `numbers` are those of `Structure.prepare`.
+        `numbers` are those of `CompiledStructure.prepare`.
         """
         n, own = len(request[0]), self.own
         ends, columns = np.zeros((n, SegmentValue.FIRST_STATE + 6 * own)), np.zeros((n, 4 * own, self._columns))

@@ -51,6 +51,7 @@ from saltus.taylor import (
     load_module,
     load_tables,
     module_name,
+    number,
     pointer,
     source_of,
     tape,
@@ -210,13 +211,16 @@ def _series(trace: Trace, plan: MemoryPlan, known: dict[Expr, int]) -> WrittenFu
     def rows(part: int, count: int) -> list[tuple[str, int]]:
         return [("m", part + row * SERIES_LENGTH) for row in range(count)]
 
-    columns, parts = [None] * (plan.rows - plan.own), plan.places
-    targets = [*rows(parts.accelerations, plan.own), *columns, *rows(parts.margins, plan.stops)]
-    positions, velocities = rows(parts.positions, plan.rows), rows(parts.velocities, plan.rows)
-    margins = motion_roots(trace)[trace.gap is not None :]
-    layout = Rows(positions, velocities, targets, SERIES_LENGTH, any_order=False, first_order=trace.first_order_rows)
-    places = Places(("m", "order"), _leaves(plan, SLOTS.now, parts.position, parts.velocity))
-    return _function("lane_series", places, SeriesOf(layout, tape([*trace.acceleration, *margins], known, series=True)))
+    parts, own, inputs = plan.places, trace.local_rows, trace.inputs_of_modes
+    positions, velocities, kept = (rows(part, plan.rows) for part in (parts.positions, parts.velocities, parts.accelerations))
+    targets = [*(kept[i] if i < plan.own else None for i in own), *rows(parts.margins, plan.stops), *[None] * len(inputs)]
+    modes = trace.mode_rows((positions[0], velocities[0], kept[0] if kept else ("m", 0)), 1)
+    margins, places = motion_roots(trace)[trace.gap is not None :], ([part[i] for i in own] for part in (positions, velocities))
+    first_order, length = trace.first_order_rows, SERIES_LENGTH
+    layout = Rows(*places, targets, length, any_order=False, first_order=first_order, coordinates=own, modes=modes)
+    leaves = Places(("m", "order"), _leaves(plan, SLOTS.now, parts.position, parts.velocity))
+    expanded = [*(trace.acceleration[i] for i in own), *margins, *inputs]
+    return _function("lane_series", leaves, SeriesOf(layout, tape(expanded, known, series=True)))
 
 
 def _one_free(trace: Trace, plan: MemoryPlan, known: dict[Expr, int]) -> WrittenFunction:
@@ -248,6 +252,8 @@ def _impact(trace: Trace, plan: MemoryPlan, known: dict[Expr, int]) -> WrittenFu
     if trace.several:
         entries = {parts.mass: trace.mass, parts.restitution: trace.restitution}
         filled = {("m", part + i): root for part, roots in entries.items() for i, root in enumerate(roots)}
+        if trace.modes is not None:  # the lanes' memory is made of zeros
+            filled = {place: root for place, root in filled.items() if root is not number(0.0)}
         return _at_new_state("lane_impact", plan, filled, known)
     if trace.contact is None or trace.next_side is None or trace.velocity_after is None:
         return _at_new_state("lane_impact", plan, {}, known)
@@ -264,7 +270,8 @@ def _impact(trace: Trace, plan: MemoryPlan, known: dict[Expr, int]) -> WrittenFu
 def _field(trace: Trace, plan: MemoryPlan, known: dict[Expr, int]) -> WrittenFunction:
     """`lane_field(m)`: the accelerations at the new state, in the place of the velocities after an impact."""
     first = plan.places.after_velocity
-    return _at_new_state("lane_field", plan, {("m", first + row): a for row, a in enumerate(trace.acceleration)}, known)
+    fields = {("m", first + row): trace.written_out(a) for row, a in enumerate(trace.acceleration)}
+    return _at_new_state("lane_field", plan, fields, known)
 
 
 def _at_new_state(name: str, plan: MemoryPlan, results: dict[tuple[str, int], Expr], known: dict[Expr, int]) -> WrittenFunction:

@@ -1,0 +1,442 @@
+"""A linear structure given by its matrices, with contacts, surfaces and frictions at some of its points.
+
+With the rows R of what is local (R u is what contacts keep on one side, surfaces pass and frictions rub), the displacements u are
+
+    u = T_b b + T_z z,    b = R u,    T_b = M^-1 R' (R M^-1 R')^-1,
+
+where the columns of T_z are the modes of the structure whose local displacements b are held. Then T' M T is block-diagonal: an
+impact changes no velocity but those of b, and what contacts hold is held without touching the amplitudes z of the modes,
+
+    z'' = g_z f(t) - w^2 z - D_z z' - K_zb b - D_zb b',    M_b b'' = g_b f(t) - K_b b - D_b b' - K_bz z - D_bz z' + reactions.
+
+All numbers of these equations are data of the compiled code, none is part of it.
+"""
+
+from __future__ import annotations
+
+from collections import UserDict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from saltus.checks import check_number
+from saltus.errors import ParameterError, near, shown
+from saltus.systems.contact_model import Contact, ContactModel, Friction, Surface, is_zero
+from saltus.systems.impact_laws import Coefficients, NamedParts
+from saltus.systems.model import Count
+from saltus.systems.record_files import ConstantNumbers, check_independent, check_matrices, matrices_in, read_array
+
+Matrix = ConstantNumbers
+MODE = "mode_"  # begins the names of the amplitudes
+# The names of the arrays in files, and what they are called in papers.
+IN_FILES = {"mass": ("mass", "M"), "stiffness": ("stiffness", "K"), "damping": ("damping", "C", "D")}
+
+
+class RowNumbers(tuple[float, ...]):
+    """The coefficients of all rows of the matrices."""
+
+    __slots__ = ()
+
+    @property
+    def structure_key(self) -> Any:
+        """What of it belongs to a system's structure: that it is there."""
+        return RowNumbers
+
+
+class Vectors(UserDict[str, RowNumbers]):
+    """Rows by their names, which do not change."""
+
+    def __hash__(self) -> int:
+        return hash(tuple(self.items()))
+
+    @property
+    def structure_key(self) -> Any:
+        """What of them belongs to a system's structure: their names."""
+        return Vectors, tuple(self)
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """A structure in local displacements and amplitudes of modes: the matrices T, T' M T, ... of the module's docstring."""
+
+    basis: np.ndarray  # T, of which the first columns are T_b
+    mass: np.ndarray  # M_b
+    stiffness: np.ndarray  # T' K T
+    damping: np.ndarray | None  # T' C T; None without damping
+    coupled: bool  # whether damping couples the modes
+    forces: np.ndarray  # T' g, a column for each channel
+
+    def coefficients(self) -> list[float]:
+        """All numbers of the equations, in the order in which `Equations` reads them."""
+        m = len(self.mass)
+        found = [self.mass, self.stiffness[:m], np.diag(self.stiffness)[m:]]
+        if self.damping is not None:
+            found += [self.damping[:m], self.damping[m:, :m], self.damping[m:, m:] if self.coupled else np.diag(self.damping)[m:]]
+        return [float(x) for block in (*found, self.forces) for x in block.ravel()]
+
+
+@lru_cache(maxsize=64)
+def modes_of(
+    mass: ConstantNumbers,
+    stiffness: ConstantNumbers,
+    damping: ConstantNumbers | None,
+    rows: ConstantNumbers,
+    forces: ConstantNumbers,
+) -> Modes:
+    """The structure in local displacements and modes."""
+    from scipy.linalg import eigh, null_space, solve
+
+    m, k, r = mass.array, stiffness.array, rows.array
+    inertial = solve(m, r.T, assume_a="pos") if len(r) else np.zeros((len(m), 0))
+    local = np.linalg.inv(r @ inertial) if len(r) else np.zeros((0, 0))
+    free = null_space(r) if len(r) else np.eye(len(m))
+    shapes = np.zeros((len(m), 0))
+    if free.shape[1]:
+        _, found = eigh(free.T @ k @ free, free.T @ m @ free)
+        shapes = free @ found
+        shapes *= np.sign(shapes[np.abs(shapes).argmax(axis=0), range(shapes.shape[1])])
+    basis, count, rounding = np.hstack([inertial @ local, shapes]), len(r), 64.0 * len(m) * np.finfo(float).eps
+    local = 0.5 * (local + local.T)
+    local[np.abs(local) <= rounding * np.abs(local).max(initial=0.0)] = 0.0
+    damped = None if damping is None else basis.T @ damping.array @ basis
+    among = np.zeros((0, 0)) if damped is None else damped[count:, count:]
+    coupled = np.abs(among - np.diag(np.diag(among))).max(initial=0.0) > rounding * np.abs(among).max(initial=0.0)
+    return Modes(basis, local, basis.T @ k @ basis, damped, bool(coupled), basis.T @ forces.array)
+
+
+class Equations:
+    """The numbers of a structure's equations, or their symbols, by their places."""
+
+    def __init__(self, structure: Structure) -> None:
+        local, self.damped, self.coupled, _ = structure.form
+        self._numbers, self._at = structure.coefficients, 0
+        self.local, self.size = len(local), len(structure.names)
+        m, n = self.local, self.size
+        self.mass, self.stiffness, self.squares = self._block(m, m), self._block(m, n), self._block(1, n - m)[0]
+        if self.damped:
+            self.local_damping, self.damping_by_local = self._block(m, n), self._block(n - m, m)
+            self.damping = self._block(n - m, n - m if self.coupled else 1)
+        self.forces = self._block(n, len(structure.forces))
+
+    def _block(self, rows: int, columns: int) -> list[Any]:
+        start, self._at = self._at, self._at + rows * columns
+        return [self._numbers[start + i * columns : start + (i + 1) * columns] for i in range(rows)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Structure(ContactModel):
+    """A linear structure of up to 200 coordinates u, with contacts, surfaces and frictions at some of its points:
+
+        M u'' + C u' + K u = sum over channels of g f(t) + the forces of surfaces + reactions + frictions.
+
+    Its coordinates are the displacements of contacts, surfaces and frictions, under their names, and behind them the amplitudes
+    `mode_1`, `mode_2`, ... of the modes, of mass 1, that it has while these are held, the slowest first. `start` makes a state of
+    displacements u, and `displacements` gives u.
+
+    Parameters
+    ----------
+    mass, stiffness, damping
+        M, K and C, (n, n); or M and K alone. Arrays, rows of numbers, or sparse matrices of SciPy.
+    file
+        Instead of them, the path of a `.npz` or `.mat` file in which they are called mass, stiffness and damping, or M, K and C.
+    contacts, surfaces, friction
+        `Contact`, `Surface` and `Friction`, whose `coordinate` is a row of the matrices, its number from 0 or its name, a point,
+        or coefficients as a point has them. On the side +1 of a surface its `stiffness` and its `damping` act. The normal force
+        of a friction is 1, so that its coefficients are forces.
+    forces
+        The vector g of each channel of the load by its name, as points are given.
+    points
+        Sums of displacements by their names: the coefficients of all rows, (n,), or of some, {0: 1.0, "x5": -1.0}; or one row.
+    names
+        The names of the rows, by default x0, x1, ...
+
+    Raises
+    ------
+    ParameterError
+        Matrices that are not square, of different sizes, or not finite; a mass that is not symmetric and positive definite; a
+        stiffness that is not symmetric; an unknown coordinate; local displacements that are not independent.
+
+    Examples
+    --------
+    >>> pair = saltus.Structure(
+    ...     mass=[[1.0, 0.0], [0.0, 2.0]], stiffness=[[2.0, -1.0], [-1.0, 1.0]],
+    ...     contacts=[saltus.Contact(name="wall", coordinate=1, position=0.5, sign=-1)], forces={"drive": 0},
+    ... )
+    >>> pair.coordinates
+    ('x1', 'mode_1')
+    >>> moved = saltus.System(model=pair, impact=saltus.NewtonImpact(e=0.8))
+    >>> motion = saltus.simulate(moved, **pair.start([0.0, 0.4]), duration=2.0)
+    >>> pair.displacements(motion).shape == (2, motion.time.size)
+    True
+    """
+
+    mass: Any = None
+    stiffness: Any = None
+    damping: Any = None
+    file: str = ""
+    contacts: Any = ()
+    surfaces: Any = ()
+    friction: Any = ()
+    forces: Any = None
+    points: Any = None
+    names: tuple[str, ...] = ()
+    coefficients: Any = None  # of the equations, which follow from the matrices
+    form: Any = None  # which blocks of numbers the equations have, and the names of the local displacements; follows too
+
+    def __post_init__(self) -> None:
+        given = matrices_in(self.file, IN_FILES) if self.file else {name: getattr(self, name) for name in IN_FILES}
+        mass, stiffness, damping = (_matrix(given.get(name), name) for name in IN_FILES)
+        check_matrices({name: m.array for name, m in zip(IN_FILES, (mass, stiffness, damping), strict=True) if m is not None})
+        names = _names_of(self.names, len(mass.array))
+        points = {name: _vector(row, names, f"points.{name}") for name, row in dict(self.points or {}).items()}
+        forces = {name: _vector(row, names, f"forces.{name}") for name, row in dict(self.forces or {}).items()}
+        parts = {
+            field: NamedParts(_part(part, kind, field, names, points) for part in _each(getattr(self, field), field))
+            for field, kind in (("contacts", Contact), ("surfaces", Surface), ("friction", Friction))
+        }
+        local = dict.fromkeys(part.coordinate for each in parts.values() for part in each)
+        rows = np.array([points.get(name) or _unit(names, name) for name in local]).reshape(len(local), len(names))
+        check_independent(rows, tuple(local))
+        columns = np.array([*forces.values()]).reshape(len(forces), len(names)).T
+        modes = modes_of(mass, stiffness, damping, ConstantNumbers(rows, "points"), ConstantNumbers(columns, "forces"))
+        pattern = tuple(tuple(bool(x) for x in row) for row in modes.mass)
+        made = {"mass": mass, "stiffness": stiffness, "damping": damping, "file": "", "names": names, **parts}
+        made |= {"forces": Vectors(forces), "points": Vectors(points), "coefficients": Coefficients(modes.coefficients())}
+        made |= {"form": (tuple(local), modes.damping is not None, modes.coupled, pattern)}
+        for name, value in made.items():
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "_basis", modes.basis)
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:  # type: ignore[override]
+        """The local displacements, then the amplitudes of the modes."""
+        local = self.form[0]
+        return (*local, *(f"{MODE}{i + 1}" for i in range(len(self.names) - len(local))))
+
+    @property
+    def channels(self) -> tuple[str, ...]:  # type: ignore[override]
+        """The channels of the load."""
+        return tuple(self.forces)
+
+    @property
+    def frictions(self) -> tuple[Friction, ...]:
+        """Its frictions."""
+        return tuple(self.friction)
+
+    def to_table(self) -> dict[str, Any]:
+        """Plain tables and texts, of which `Structure(**table)` makes it again."""
+        table: dict[str, Any] = {name: m.packed() for name in IN_FILES if (m := getattr(self, name)) is not None}
+        for field in ("contacts", "surfaces", "friction"):
+            if parts := getattr(self, field):
+                table[field] = [_table_of(part) for part in parts]
+        for field in ("forces", "points"):
+            if rows := getattr(self, field):
+                table[field] = {name: list(row) for name, row in rows.items()}
+        return table | ({"names": list(self.names)} if self.names != _names_of((), len(self.names)) else {})
+
+    @property
+    def local_count(self) -> int:
+        """The number of coordinates whose equations are traced one by one, while those of the modes are loops."""
+        return len(self.form[0]) or len(self.names)
+
+    def mass_matrix(self, theta: Any) -> Any:
+        """M_b, and 1 for each mode; M_b alone for the local coordinates of a trace."""
+        own = Equations(self)
+        if isinstance(theta, tuple) and hasattr(theta, "sum_over_modes"):
+            known = self.form[3]
+            return [[x if there else 0.0 for x, there in zip(*each, strict=True)] for each in zip(own.mass, known, strict=True)]
+        rows = [[float(i == j) for j in range(own.size)] for i in range(own.size)]
+        for row, masses, known in zip(rows, own.mass, self.form[3], strict=False):
+            row[: own.local] = [x if there else 0.0 for x, there in zip(masses, known, strict=True)]
+        return rows[0][0] if own.size == 1 else rows
+
+    def force(self, t: Any, theta: Any, velocity: Any, load: Any, *sides: Any) -> Any:
+        """The forces on the local displacements and on the modes, without reactions and frictions."""
+        own = Equations(self)
+        q, v = (list(x) if own.size > 1 else [x] for x in (theta, velocity))
+        m, size = own.local, len(q)
+        pushes = [getattr(load, name)(t) for name in self.forces]
+        found = [_sum(own.forces[i], pushes) for i in range(size)]
+        for i in range(m):
+            found[i] = found[i] - _sum(own.stiffness[i][:size], q)
+            if own.damped:
+                found[i] = found[i] - _sum(own.local_damping[i][:size], v)
+            if size < own.size:
+                rates = own.local_damping[i][m:] if own.damped else None
+                found[i] = found[i] - theta.sum_over_modes(own.stiffness[i][m:], rates)
+        for i in range(m, size):
+            across = _sum([row[i] for row in own.stiffness], q[:m])
+            found[i] = found[i] - own.squares[i - m] * q[i] - across
+            if own.damped:
+                row, rates = own.damping[i - m], v[m:] if own.coupled else [v[i]]
+                found[i] = found[i] - _sum(row, rates) - _sum(own.damping_by_local[i - m], v[:m])
+        for surface in self.surfaces:
+            i, side = self.form[0].index(surface.coordinate), sides[0][surface.name]
+            pressed = surface.stiffness * (q[i] - surface.position) + surface.damping * v[i]
+            found[i] = found[i] - 0.5 * (1.0 + side) * pressed
+        return found[0] if own.size == 1 else tuple(found)
+
+    def mode_equations(self, t: Any, theta: Any, velocity: Any, load: Any) -> tuple[Any, Any, list[tuple[Any, Any, int, float]]]:
+        """w^2 and D of the modes; their inputs, each with its first coefficient, the step to that of the next mode, a sign."""
+        own, found = Equations(self), list[tuple[Any, Any, int, float]]()
+        m, channels = own.local, list(self.forces)
+        found += [(x, own.stiffness[i][m], 1, -1.0) for i, x in enumerate(theta)]
+        if own.damped:
+            found += [(x, own.damping_by_local[0][i], m, -1.0) for i, x in enumerate(velocity)]
+        found += [(getattr(load, name)(t), own.forces[m][k], len(channels), 1.0) for k, name in enumerate(channels)]
+        return own.squares, [x for row in own.damping for x in row] if own.damped else None, found
+
+    def kinetic_energy(self, t: Any, theta: Any, velocity: Any, side: Any, load: Any) -> Any:
+        """u' M u' / 2 of the velocities u."""
+        own = Equations(self)
+        v = list(velocity) if own.size > 1 else [velocity]
+        local = sum(v[i] * _sum(own.mass[i], v[: own.local]) for i in range(own.local))
+        return 0.5 * (local + sum(x * x for x in v[own.local :]))
+
+    def displacements(self, of: Any) -> np.ndarray:
+        """The displacements u, (n,) or (n, times), of coordinates of this model; velocities u' of their rates.
+
+        Parameters
+        ----------
+        of
+            Coordinates or their rates, as `Motion.at` gives them, (n,) or (n, times).
+        """
+        given = np.asarray(of, dtype=float)
+        if given.shape[:1] != (len(self.names),):
+            raise ParameterError(f"displacements takes {len(self.names)} coordinates along the first axis, got {shown(of)}", "of")
+        return np.asarray(self._basis @ given)
+
+    def start(self, displacement: Any = 0.0, velocity: Any = 0.0) -> dict[str, Any]:
+        """The state with these displacements u and velocities u', by the names of the arguments of `simulate`.
+
+        Parameters
+        ----------
+        displacement, velocity
+            Numbers for all rows of the matrices, (n,), or one for all of them; by default 0.
+        """
+        found = []
+        for name, given in (("displacement", displacement), ("velocity", velocity)):
+            vector = _vector(np.full(len(self.names), given) if np.ndim(given) == 0 else given, self.names, name)
+            found.append([float(x) for x in np.linalg.solve(self._basis, vector)])
+        local = [self.names.index(name) if name in self.names else None for name in self.form[0]]
+        for values, given in zip(found, (displacement, velocity), strict=True):
+            for i, row in enumerate(local):  # exactly as given, so that what is at a contact is there
+                if row is not None:
+                    values[i] = float(given if np.ndim(given) == 0 else given[row])
+        return {**dict(zip(self.coordinates, found[0], strict=True)), "velocity": found[1] if len(found[1]) > 1 else found[1][0]}
+
+
+def _sum(factors: Sequence[Any], values: Sequence[Any]) -> Any:
+    """The sum of products."""
+    total: Any = 0.0
+    for factor, value in zip(factors, values, strict=True):
+        if not is_zero(value):
+            total = factor * value if is_zero(total) else total + factor * value
+    return total
+
+
+# --- what is given ------------------------------------------------------------------------------------------------------------
+
+
+def _matrix(given: Any, name: str) -> Any:
+    """A matrix that was given, or None for a damping that was not."""
+    if given is None and name != "damping":
+        raise ParameterError(f"{name} is missing: a structure is given by its mass and its stiffness, or by a file of them", name)
+    return given if given is None or isinstance(given, ConstantNumbers) else ConstantNumbers(given, name)
+
+
+def _names_of(given: Any, size: int) -> tuple[str, ...]:
+    """The names of the rows."""
+    names = tuple(given) or tuple(f"x{i}" for i in range(size))
+    if len(names) != size or len(set(names)) < size:
+        raise ParameterError(f"names must be {size} different names, one for each row of the mass, got {shown(given)}", "names")
+    for name in names:
+        _check_name(name, "names")
+    return names
+
+
+def _check_name(name: Any, where: str) -> None:
+    """Refuse a name that no coordinate can have."""
+    if not (isinstance(name, str) and name.isidentifier() and name != "velocity" and not name.startswith(MODE)):
+        raise ParameterError(f"{where}: {shown(name)} is no name for a coordinate, which is as x1 or tip is, not {MODE}1", where)
+
+
+def _vector(given: Any, names: tuple[str, ...], where: str) -> Any:
+    """The coefficients of all rows, from themselves, from a row's name or number, or from a dictionary of some rows."""
+    if isinstance(given, RowNumbers):
+        return given
+    if isinstance(given, (str, int, np.integer)) and not isinstance(given, bool):
+        given = {given: 1.0}
+    if isinstance(given, Mapping):
+        row = [0.0] * len(names)
+        for key, factor in given.items():
+            row[_place(key, names, where)] = factor
+        given = row
+    values = read_array(given, where)
+    if values.shape != (len(names),):
+        raise ParameterError(f"{where} must have {len(names)} numbers, one for each row of the mass, got {shown(given)}", where)
+    return RowNumbers(values.tolist())
+
+
+def _place(key: Any, names: tuple[str, ...], where: str) -> int:
+    """The number of a row that is given by its number or its name."""
+    if isinstance(key, (int, np.integer)) and not isinstance(key, bool):
+        if -len(names) <= key < len(names):
+            return int(key) % len(names)
+        raise ParameterError(f"{where}: there is no row {key}; the rows are 0 to {len(names) - 1}", where)
+    if key not in names:
+        raise ParameterError(f"{where}: no row is called {shown(key)}; {near(str(key), names)}", where)
+    return names.index(key)
+
+
+def _unit(names: tuple[str, ...], name: str) -> RowNumbers:
+    """The row with which a displacement of the structure's own is local."""
+    return RowNumbers(float(other == name) for other in names)
+
+
+def _each(given: Any, field: str) -> Sequence[Any]:
+    """The parts that were given, one or several."""
+    if isinstance(given, (tuple, list)):
+        return given
+    raise ParameterError(f"{field} must be a list, got {shown(given)}", field)
+
+
+def _part(part: Any, kind: Any, field: str, names: tuple[str, ...], points: dict[str, RowNumbers]) -> Any:
+    """A contact, surface or friction whose coordinate is the name of a row or of a point; a sum becomes a point with its name."""
+    if isinstance(part, Mapping):
+        known = [each.name for each in fields(kind)]
+        if unknown := [name for name in part if name not in known]:
+            raise ParameterError(f"{field}: {kind.__name__} has no {shown(unknown[0])}; {near(str(unknown[0]), known)}", field)
+        if "name" not in part or "coordinate" not in part:
+            raise ParameterError(f"{field}: a {kind.__name__} needs a name and a coordinate, got {shown(part)}", field)
+        part = kind(**part)
+    if not isinstance(part, kind):
+        raise ParameterError(f"{field} must be of class {kind.__name__}, got {shown(part)}", field)
+    where, on = f"{field}.{part.name}", part.coordinate
+    _check_name(part.name, where)
+    if isinstance(on, str) and (on in points or on in names):
+        coordinate = on
+    elif isinstance(on, (str, int, np.integer)):
+        coordinate = names[_place(on, (*names, *points) if isinstance(on, str) else names, where)]
+    else:
+        if part.name in names or part.name in points:
+            raise ParameterError(f"{where}: a row or a point is called {part.name} already; give the sum as a point", where)
+        points[part.name] = _vector(on, names, where)
+        coordinate = part.name
+    for each in fields(part):
+        value = getattr(part, each.name)
+        if each.name not in ("name", "coordinate", "sign", "group") and value is not None:
+            check_number(f"{where}.{each.name}", value)
+    made: Any = replace(part, coordinate=coordinate)
+    if hasattr(made, "sign"):
+        object.__setattr__(made, "sign", Count(int(made.sign)))
+    return made
+
+
+def _table_of(part: Any) -> dict[str, Any]:
+    """The fields of a contact, surface or friction that are not as they are by default."""
+    table = {each.name: getattr(part, each.name) for each in fields(part) if getattr(part, each.name) != each.default}
+    return table | ({"sign": int(part.sign)} if hasattr(part, "sign") else {})

@@ -1,0 +1,173 @@
+"""A structure from its matrices: its coordinates and equations, what it refuses, and how it is written."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+import saltus
+
+
+def chain(size: int, damping: float = 0.02) -> dict[str, np.ndarray]:
+    """The matrices of equal masses between springs, the first of which is fixed."""
+    stiffness = 2.0 * np.eye(size) - np.eye(size, k=1) - np.eye(size, k=-1)
+    stiffness[-1, -1] = 1.0
+    return {"mass": np.eye(size), "stiffness": stiffness, "damping": damping * stiffness}
+
+
+STOP = saltus.Contact(name="stop", coordinate=2, position=0.3, sign=-1)
+SOFT = saltus.Surface(name="soft", coordinate=0, position=0.1, stiffness=5.0, damping=0.1)
+LOAD = saltus.Load(frequency=0.6, drive=saltus.Harmonic(0.1))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ThreeMasses(saltus.ContactModel):
+    """The same chain of three masses, with its equations written out."""
+
+    coordinates = ("x0", "x1", "x2")
+    channels = ("drive",)
+    contacts = (saltus.Contact(name="stop", coordinate="x2", position=0.3, sign=-1),)
+    surfaces = (saltus.Surface(name="soft", coordinate="x0", position=0.1),)
+
+    damper: float = 0.02
+
+    def force(self, t, q, v, load, sides):
+        pulled = [2 * q[0] - q[1], 2 * q[1] - q[0] - q[2], q[2] - q[1]]
+        slowed = [2 * v[0] - v[1], 2 * v[1] - v[0] - v[2], v[2] - v[1]]
+        found = [-k - self.damper * c for k, c in zip(pulled, slowed, strict=True)]
+        found[0] += load.drive(t) - 0.5 * (1 + sides.soft) * (5.0 * (q[0] - 0.1) + 0.1 * v[0])
+        return tuple(found)
+
+
+def test_motion_is_that_of_the_model_written_out() -> None:
+    structure = saltus.Structure(**chain(3), contacts=[STOP], surfaces=[SOFT], forces={"drive": 0})
+    law = saltus.NewtonImpact(e=0.7)
+    moved = saltus.simulate(
+        saltus.System(model=structure, load=LOAD, impact=law), **structure.start([0.05, 0.1, 0.2], [0.0, 0.1, -0.3]), periods=12
+    )
+    written = saltus.simulate(
+        saltus.System(model=ThreeMasses(), load=LOAD, impact=law), x0=0.05, x1=0.1, x2=0.2, velocity=(0.0, 0.1, -0.3), periods=12
+    )
+    assert len(moved.impacts) == len(written.impacts) == 9
+    assert np.abs(moved.impacts.time - written.impacts.time).max() < 1e-12
+    assert np.abs(structure.displacements(moved.position) - written.position).max() < 1e-12
+    assert np.abs(structure.displacements(moved.velocity) - written.velocity).max() < 1e-12
+
+
+def test_derivatives_are_those_of_the_model_written_out() -> None:
+    structure, law = (
+        saltus.Structure(**chain(3), contacts=[STOP], surfaces=[SOFT], forces={"drive": 0}),
+        saltus.NewtonImpact(e=0.7),
+    )
+    asked = {"parameters": ["load.frequency", "load.drive.amplitude", "impact.e"], "periods": 6}
+    own = saltus.sensitivities(
+        saltus.System(model=structure, load=LOAD, impact=law), **structure.start([0.05, 0.1, 0.2], [0.0, 0.1, -0.3]), **asked
+    )
+    written = saltus.sensitivities(
+        saltus.System(model=ThreeMasses(), load=LOAD, impact=law), x0=0.05, x1=0.1, x2=0.2, velocity=(0.0, 0.1, -0.3), **asked
+    )
+    assert len(own.motion.impacts) == 5
+    basis = np.kron(np.eye(2), structure.displacements(np.eye(3)))
+    assert np.abs(basis @ own.parameters - written.parameters).max() < 1e-11
+    assert np.abs(basis @ own.state @ np.linalg.inv(basis) - written.state).max() < 1e-11
+
+
+def test_coordinates_are_local_displacements_and_held_modes() -> None:
+    given = chain(6)
+    tip = saltus.Contact(name="tip", coordinate=[0.0, 0.0, 0.0, 0.0, -1.0, 1.0], position=-1.0)
+    structure = saltus.Structure(**given, contacts=[tip])
+    assert structure.coordinates == ("tip", *(f"mode_{i}" for i in range(1, 6)))
+    u = np.linspace(-0.5, 1.0, 6)
+    start = structure.start(u)
+    assert start["tip"] == pytest.approx(u[5] - u[4], abs=1e-15)
+    assert np.abs(structure.displacements([start[name] for name in structure.coordinates]) - u).max() < 1e-14
+    basis = structure.displacements(np.eye(6))
+    reduced = basis.T @ given["mass"] @ basis
+    assert np.abs(reduced[1:, 1:] - np.eye(5)).max() < 1e-14
+    assert np.abs(reduced[0, 1:]).max() < 1e-14
+
+
+def test_kinetic_energy_is_that_of_the_displacements() -> None:
+    given = chain(5)
+    given["mass"] = given["mass"] + 0.2 * given["stiffness"]
+    structure = saltus.Structure(**given, contacts=[STOP, saltus.Contact(name="other", coordinate=4, position=1.0, sign=-1)])
+    rates = np.arange(1.0, 6.0)
+    energy = structure.kinetic_energy(0.0, (0.0,) * 5, tuple(rates), 1, saltus.Load())
+    u = structure.displacements(rates)
+    assert energy == pytest.approx(u @ given["mass"] @ u / 2, rel=1e-13)
+
+
+def test_a_structure_with_other_numbers_is_not_traced_anew() -> None:
+    from saltus.taylor.generated import structure_key
+
+    def key(damping, *contacts):
+        model = saltus.Structure(**chain(4, damping), contacts=contacts, forces={"drive": 0})
+        return structure_key(saltus.System(model=model, load=LOAD))
+
+    assert key(0.02, STOP) == key(0.5, STOP)
+    assert key(0.02, STOP) != key(0.02, STOP, SOFT_WALL)
+
+
+SOFT_WALL = saltus.Contact(name="wall", coordinate=0, position=-2.0)
+
+
+def test_numbers_of_its_parts_are_parameters() -> None:
+    structure = saltus.Structure(**chain(3), contacts=[STOP], surfaces=[SOFT], forces={"drive": {0: 1.0, "x2": 0.5}})
+    system = saltus.System(model=structure, load=LOAD)
+    moved = system.with_({"model.contacts.stop.position": 0.5, "model.surfaces.soft.stiffness": 7.0})
+    assert moved.parameters["model.contacts.stop.position"] == 0.5
+    assert moved.model.surfaces[0].stiffness == 7.0
+    assert not [path for path in system.parameters if "coefficients" in path]
+
+
+@pytest.mark.parametrize("text", ["json", "toml"])
+def test_a_structure_is_read_back_as_it_was_written(text: str) -> None:
+    structure = saltus.Structure(**chain(3), contacts=[STOP], surfaces=[SOFT], forces={"drive": 0}, points={"mean": [0.3] * 3})
+    system = saltus.System(model=structure, load=LOAD)
+    assert getattr(saltus.System, f"from_{text}")(getattr(system, f"to_{text}")()) == system
+
+
+@pytest.mark.parametrize("name", ["chain.npz", "chain.mat"])
+def test_matrices_of_files(tmp_path, name: str) -> None:
+    given, path = chain(3), tmp_path / name
+    called = dict(zip(("M", "K", "C"), given.values(), strict=True))
+    if path.suffix == ".npz":
+        np.savez(path, **called)
+    else:
+        from scipy.io import savemat
+
+        savemat(path, called)
+    assert saltus.Structure(file=str(path), contacts=[STOP]) == saltus.Structure(**given, contacts=[STOP])
+
+
+GOOD = chain(3)
+REFUSED = {
+    "mass must be a square matrix, got one of 2 x 3": {"mass": np.eye(3)[:2]},
+    "stiffness must be 3 x 3 as the mass is, got 2 x 2": {"stiffness": np.eye(2)},
+    "mass must be symmetric, got 0.1 in row 0, column 1": {"mass": np.eye(3) + 0.1 * np.eye(3, k=1)},
+    "mass must be positive definite, and its least eigenvalue is -1": {"mass": np.diag([1.0, -1.0, 1.0])},
+    "stiffness must be symmetric": {"stiffness": np.eye(3) + np.eye(3, k=1)},
+    "stiffness must be finite; it holds nan or inf": {"stiffness": np.diag([1.0, np.nan, 1.0])},
+    "damping must be rows of numbers": {"damping": "strong"},
+    "mass is missing": {"mass": None},
+    "at most 200 rows, got 201": {"mass": np.eye(201), "stiffness": np.eye(201), "damping": None},
+    "contacts.stop: there is no row 7; the rows are 0 to 2": {
+        "contacts": [saltus.Contact(name="stop", coordinate=7, position=1.0)]
+    },
+    "contacts.stop: no row is called 'tip'": {"contacts": [saltus.Contact(name="stop", coordinate="tip", position=1.0)]},
+    "forces.drive must have 3 numbers, one for each row": {"forces": {"drive": [1.0, 2.0]}},
+    "the displacement both follows from x0, x1": {
+        "contacts": [
+            saltus.Contact(name="a", coordinate=0, position=-1.0),
+            saltus.Contact(name="b", coordinate=1, position=-1.0),
+            saltus.Contact(name="both", coordinate={0: 1.0, 1: 1.0}, position=-2.0),
+        ]
+    },
+}
+
+
+@pytest.mark.parametrize("sentence", REFUSED)
+def test_what_is_no_structure_is_refused(sentence: str) -> None:
+    with pytest.raises(saltus.ParameterError) as error:
+        saltus.Structure(**{**GOOD, **REFUSED[sentence]})
+    assert sentence in str(error.value)
