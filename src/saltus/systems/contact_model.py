@@ -440,7 +440,7 @@ def sides_for(model: Any, t: Any, q: Any, load: Any) -> tuple[Sides, ...]:
         return (load.sides,)
     known = dict(zip(model.coordinates, q if len(model.coordinates) > 1 else (q,), strict=True))
 
-    def at(surface: Surface) -> Any:
+    def kept(surface: Surface) -> Any:
         """The coordinate of a surface, or its sum."""
         if isinstance(surface.coordinate, str):
             return known[surface.coordinate]
@@ -448,7 +448,7 @@ def sides_for(model: Any, t: Any, q: Any, load: Any) -> tuple[Sides, ...]:
             factor * (known[name] if name in known else getattr(load, name)(t)) for name, factor in surface.coordinate.items()
         )
 
-    return (Sides({each.name: each.side(at(each)) for each in model.surfaces}),)
+    return (Sides({each.name: each.side(kept(each)) for each in model.surfaces}),)
 
 
 def _held(entry: Any, i: int, j: int, free: Sequence[Any]) -> Any:
