@@ -229,6 +229,12 @@ def good(made):
         "Surface": (saltus.Surface, {"name": "stop", "coordinate": "x"}),
         "Surface.side": (saltus.Surface(name="stop", coordinate="x").side, {"position": 0.5}),
         "Friction": (saltus.Friction, {"name": "belt", "coordinate": "x", "kinetic": 0.2}),
+        "Friction.coefficient": (saltus.Friction(name="belt", coordinate="x", kinetic=0.2).coefficient, {"speed": 0.1}),
+        "Friction.slipping": (
+            saltus.Friction(name="belt", coordinate="x", kinetic=0.2).slipping,
+            {"velocity": 0.1, "direction": 1},
+        ),
+        "PoissonImpact": (saltus.PoissonImpact, {}),
         "HalfSine": (saltus.HalfSine, {"amplitude": 0.1, "frequency": 1.0}),
         "Harmonic": (saltus.Harmonic, {"amplitude": 0.1}),
         "Load": (saltus.Load, {"frequency": 1.0, "horizontal": 0.1}),

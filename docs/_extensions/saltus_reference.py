@@ -56,7 +56,7 @@ FIRST = (
         "TwoStops",
         "ImpactPair",
     ),
-    *("VelocityReduction", "NewtonImpact", "InelasticImpact", "EnergyRestitution"),
+    *("VelocityReduction", "NewtonImpact", "PoissonImpact", "InelasticImpact", "EnergyRestitution"),
     *("OneContactModel", "ContactModel", "Contact", "Friction", "Model"),
     *("simulate", "simulate_many", "sensitivities", "stop_names", "Motion"),
     *("find_orbit", "continue_orbit", "switch_branch", "continue_special", "search_orbits", "PeriodicOrbit", "Branch"),

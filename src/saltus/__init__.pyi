@@ -91,6 +91,7 @@ from .systems.contact_model import Friction as Friction
 from .systems.contact_model import Surface as Surface
 from .systems.impact_laws import InelasticImpact as InelasticImpact
 from .systems.impact_laws import NewtonImpact as NewtonImpact
+from .systems.impact_laws import PoissonImpact as PoissonImpact
 from .systems.model import OneContactModel as OneContactModel
 from .systems.oscillators import BeltOscillator as BeltOscillator
 from .systems.oscillators import ImpactPair as ImpactPair

@@ -14,7 +14,7 @@ import numpy as np
 
 from saltus.errors import ParameterError, near, shown
 from saltus.files import parsed_json
-from saltus.notebook import html_table, rows_table
+from saltus.progress import html_table, rows_table
 
 if TYPE_CHECKING:
     import pandas

@@ -9,8 +9,8 @@ import saltus
 from saltus.config import Study
 from saltus.errors import ParameterError
 from saltus.files import write_dataset
-from saltus.notebook import html_table
 from saltus.orbits import orbits_of
+from saltus.progress import html_table
 
 SYSTEM = saltus.System(
     model=saltus.Metainterface(beta0=1.4, damping=0.1),

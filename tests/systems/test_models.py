@@ -68,8 +68,13 @@ FLOOR = (Contact(name="floor", coordinate="x"),)
         (made(ContactModel, force=pulled, contacts=FLOOR + FLOOR), "must have names of their own, got floor, floor"),
         (made(ContactModel, force=pulled, contacts=(Contact(name="a", coordinate="y"),)), "holds 'y', but Own has x"),
         (
-            made(ContactModel, force=pulled, contacts=FLOOR, frictions=(Friction(name="f", coordinate="x", kinetic=0.1),)),
-            "and something else hold x",
+            made(
+                ContactModel,
+                force=pulled,
+                contacts=FLOOR,
+                frictions=(Friction(name="f", coordinate="x", kinetic=0.1, contact="floor"),),
+            ),
+            "along whose coordinate x a friction acts",
         ),
     ],
 )

@@ -13,8 +13,8 @@ import numpy as np
 from saltus.attractors.stroboscopic_section import is_constant
 from saltus.checks import check_count
 from saltus.flow import Ending, extrema_names, state_names
-from saltus.notebook import html_table, rows_table
 from saltus.orbits import PeriodicOrbit
+from saltus.progress import html_table, rows_table
 from saltus.result import Result, provenance
 from saltus.systems import System, Window
 

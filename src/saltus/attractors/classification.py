@@ -20,9 +20,8 @@ from saltus.attractors.stroboscopic_section import Certificate, certify, stays_a
 from saltus.checks import Numbers, check_count, check_number
 from saltus.errors import MotionError
 from saltus.flow import RECURRENCE, Ending, EventKind, Recurrence, find_recurrence, simulate
-from saltus.notebook import html_table
 from saltus.orbits import PeriodicOrbit
-from saltus.progress import Progress, part_of, silent
+from saltus.progress import Progress, html_table, part_of, silent
 from saltus.result import Result, result_dataset
 from saltus.systems import System, arguments_of, read_start, rest_state, state_of
 

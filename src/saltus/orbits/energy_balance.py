@@ -351,7 +351,10 @@ def _friction_parts(course: SampledPart, mass: np.ndarray, force: np.ndarray) ->
     slides = modes_of(model, course.side)[1]
     for friction, normal, slide in zip(frictions, normals, slides, strict=True):
         i, ground = model.coordinates.index(friction.coordinate), friction.ground_speed
-        acting = np.where(slide == 0, holding[i], -friction.kinetic * normal * slide)
+        for contact in (each for each in system.contact_model.contacts if each.name == friction.contact):
+            normal = np.where(slide == 2, 0.0, contact.sign * holding[model.coordinates.index(contact.coordinate)])
+        way = np.where(slide == 2, 0, slide)
+        acting = np.where(slide == 0, holding[i], -friction.slipping(course.velocity[i], way) * normal)
         if ground:
             parts[SUPPLIED, f"ground.{friction.name}"] = course.integral(acting * ground)
         parts[DISSIPATED, f"friction.{friction.name}"] = course.integral(acting * (ground - course.velocity[i]))

@@ -13,9 +13,9 @@ from saltus.checks import LIMITS, check_count
 from saltus.continuation import newton
 from saltus.errors import MotionError
 from saltus.flow import Motion, SegmentColumn, Validity, simulate
-from saltus.notebook import html_table
 from saltus.orbits.equations.contract import OrbitEquations, OrbitEvaluation, Solution
 from saltus.orbits.signature import TOLERANCES, Signature
+from saltus.progress import html_table
 from saltus.result import Result
 from saltus.systems import System, arguments_of, state_of
 

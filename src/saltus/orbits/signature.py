@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from saltus.flow import EventCode
-from saltus.notebook import html_table
+from saltus.progress import html_table
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,8 +12,7 @@ import numpy as np
 from saltus.checks import check_count, check_number, checked_by
 from saltus.errors import MotionError, ParameterError, SaltusError, near, shown
 from saltus.flow import state_names
-from saltus.notebook import html_table
-from saltus.progress import Progress, silent
+from saltus.progress import Progress, html_table, silent
 from saltus.result import Result, result_dataset
 from saltus.studies.measured_motions import (
     START,

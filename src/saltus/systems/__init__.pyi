@@ -1,8 +1,8 @@
 from .contact_model import ContactModel as ContactModel
-from .contact_model import apart as apart
 from .contact_model import constrained_acceleration as constrained_acceleration
+from .contact_model import friction_margins as friction_margins
 from .contact_model import mass_and_force as mass_and_force
-from .contact_model import normal_limits as normal_limits
+from .contact_model import mass_rows as mass_rows
 from .contact_model import reactions as reactions
 from .contact_model import stick_margins as stick_margins
 from .drawings import Shape as Shape

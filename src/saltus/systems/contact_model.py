@@ -11,7 +11,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.errors import ParameterError, near
+from saltus.errors import ParameterError
+from saltus.systems.load import LoadOnSides, Sides
 from saltus.systems.model import Model
 
 Number = Any  # a float, or a parameter of the model while its equations are traced
@@ -75,46 +76,82 @@ class Contact:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Friction:
-    """Coulomb friction along a coordinate q on a ground that moves with the speed w, under the normal force N of the model:
+    """Coulomb friction along a coordinate q on a ground that moves with the speed w, under a normal force N:
 
-        it slides, and the force on q is -mu_k N sign(q' - w), or it sticks, q' = w, and the force is at most mu_s N.
+        it slides, and the force on q is -mu N sign(q' - w), or it sticks, q' = w, and the force is at most mu_s N.
 
-    N is the model's `normal_forces`, a function of time, state and load, but not of accelerations.
+    N is the reaction of a contact, if one is named, and else the model's `normal_forces`, of time, state and load. mu is mu_k, or
+    falls with u = abs(q' - w) as Stribeck has it: mu_k + (mu_s - mu_k) exp(-u / v_s). A friction in a contact acts along another
+    coordinate, while it is closed and at its impacts J, with impulses of at most mu_k J.
 
     Parameters
     ----------
     name
         Its name, such as "belt", in events.
     coordinate
-        The name of the model's coordinate.
+        The name of the model's coordinate, or a dictionary of the coefficients of several, as of a `Contact`.
     kinetic
         mu_k, a number, which may be one of the model's parameters.
     static
         mu_s, at least mu_k; by default mu_k.
     ground_speed
         w, the speed of the ground.
+    contact
+        The name of the contact whose reaction is N; by default N is given by the model.
+    stribeck_speed
+        v_s, above 0; by default mu = mu_k at all speeds.
 
     Examples
     --------
     >>> saltus.Friction(name="belt", coordinate="x", kinetic=0.2, static=0.3, ground_speed=0.5).static
     0.3
+    >>> falling = saltus.Friction(name="belt", coordinate="x", kinetic=0.2, static=0.3, stribeck_speed=0.1)
+    >>> round(falling.coefficient(0.1), 6)
+    0.236788
     """
 
     name: str
-    coordinate: str
+    coordinate: Any
     kinetic: Number
     static: Number | None = None
     ground_speed: Number = 0.0
+    contact: str | None = None
+    stribeck_speed: Number | None = None
 
     @property
     def limit(self) -> str:
-        """The name of the limit at which a motion ends, as the normal force does not press any more."""
-        return f"normal force of {self.name}"
+        """The name of the limit at which a motion ends: the normal force does not press any more, or the reaction of the contact
+        is not the only one any more."""
+        return f"normal force of {self.name}" if self.contact is None else f"Painleve's paradox at {self.contact}"
 
     @property
     def most(self) -> Any:
         """mu_s."""
         return self.kinetic if self.static is None else self.static
+
+    def coefficient(self, speed: Any) -> Any:
+        """mu at a sliding speed.
+
+        Parameters
+        ----------
+        speed
+            u, not negative.
+        """
+        if self.stribeck_speed is None:
+            return self.kinetic
+        return self.kinetic + (self.most - self.kinetic) * np.exp(-speed / self.stribeck_speed)
+
+    def slipping(self, velocity: Any, direction: Any) -> Any:
+        """mu sign(q' - w) at a velocity q' along which it slides in a direction, +1 or -1; 0 if it sticks, 0.
+
+        Parameters
+        ----------
+        velocity
+            q'.
+        direction
+            The sign.
+        """
+        return direction * self.coefficient(direction * (velocity - self.ground_speed))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -167,28 +204,7 @@ class Surface:
         return self.sign * np.where(np.asarray(position) >= self.position, 1.0, -1.0)[()]
 
 
-class Sides(dict[str, Any]):
-    """The sides of a model's surfaces, +1 or -1, by their names: `sides.stop` or `sides["stop"]`."""
-
-    def __getattr__(self, name: str) -> Any:
-        if name not in self:
-            raise ParameterError(f"no surface {name!r}; {near(name, self)}", "sides")
-        return self[name]
-
-
-class LoadOnSides:
-    """A load together with the sides on which the equations are asked for."""
-
-    def __init__(self, load: Any, sides: Sides) -> None:
-        self._load, self.sides = load, sides
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._load, name)
-
-
-MOST_CONTACTS = np.iinfo(
-    np.int64
-).bits  # Which are closed is noted in the bits of a whole number, in which a friction or a surface takes two.
+MOST_CONTACTS = np.iinfo(np.int64).bits  # Those closed are bits of a whole number; a friction or a surface takes two.
 MOST_FRICTIONS = 6  # Which frictions stick, and which way the others slide, is found by trying 3^n choices at worst.
 
 
@@ -203,8 +219,8 @@ class ContactModel(Model):
     2. `mass_matrix`, M(q), symmetric and positive definite, where that is not the identity;
     3. `contacts`, a tuple of `Contact`, each of which keeps one coordinate, or a sum of several, on one side of a position. While
        a contact is closed it holds it as long as its reaction presses; impacts follow the system's law (`NewtonImpact`);
-    4. `frictions`, a tuple of `Friction`, and their `normal_forces` N(t, q, v), by default 1. A friction that sticks holds the
-       velocity of its coordinate. M(q) may connect no coordinate with a friction to one with a contact;
+    4. `frictions`, a tuple of `Friction`, and their `normal_forces` N(t, q, v), by default 1, of those that are in no contact.
+       A friction that sticks holds the velocity of its coordinate, or of a sum of several;
     5. `surfaces`, a tuple of `Surface`. Then `force` takes a further argument, r(t, q, v, load, sides), and reads `sides.stop`,
        +1 or -1, of the surface "stop";
     6. optionally `after_impact`, by which the coordinates of first order jump at impacts, `transfers` (whether an impact passes
@@ -246,9 +262,19 @@ class ContactModel(Model):
             The load, whose channels are called with the time: `load.horizontal(t)`.
         """
         size = len(self.coordinates)
-        still = [0.0] * len(self.frictions)  # and the surfaces on the sides of the state
-        solved = constrained_acceleration(self, t, theta, velocity, load, [1.0] * size, still)
+        solved = constrained_acceleration(self, t, theta, velocity, load, [1.0] * size)
         return solved[0] if size == 1 else tuple(solved)
+
+    @property
+    def friction_limits(self) -> tuple[str, ...]:
+        """The limits at which its frictions end a motion: that of one in a contact only where M(q) depends on q, as it is else
+        known from the start whether reactions are the only ones."""
+        pressed = [friction for friction in self.frictions if friction.contact is not None]
+        if pressed:
+            size = len(self.coordinates)
+            one, other = (mass_rows(self, tuple(x / (1 + i) for i in range(size))) for x in (0.13, 0.21))  # any numbers
+            pressed = pressed if np.not_equal(one, other).any() else []
+        return tuple(friction.limit for friction in self.frictions if friction.contact is None or friction in pressed)
 
     def reaches(self, coordinate: str, values: Any) -> Any:
         """Whether a coordinate can have these values: where the gap of none of its contacts is negative.
@@ -334,51 +360,97 @@ def constrained_acceleration(
 ) -> list[Any]:
     """The accelerations a of (D M D + 1 - D) a = D r, with D = diag(free): 1 where a coordinate is free, 0 where it is held.
 
-    r has the force of each friction that slides, -mu_k N s with its direction s in `slides`, 0 where it sticks. Behind them may
-    be +1 or -1 for each surface: whether its coordinate is above the position; else the state says so.
+    r has the force of each friction that slides, -mu N s with its direction s in `slides`, 0 where it sticks. Behind them may
+    be +1 or -1 for each surface: whether its coordinate is above the position; else the state says so. Where N is the reaction
+    of a contact, plus or minus the row n of M a - r, its multiple is added to the row of the friction.
 
     q and v are scalars where there is one coordinate, else tuples. The matrix is eliminated from its first row on, without
-    exchanging rows, as the pivots of a positive definite matrix are positive.
+    exchanging rows, as the pivots of a positive definite matrix are positive; rows of frictions in contacts come last.
     """
     load = _on_sides(model, load, slides)
     mass, force = mass_and_force(model, t, q, v, load)
-    for friction, normal, s in zip(model.frictions, normal_forces(model, t, q, v, load), slides, strict=False):
-        place = model.coordinates.index(friction.coordinate)
-        force[place] = force[place] - s * friction.kinetic * normal
+    late = _add_frictions(model, v, mass, force, (normal_forces(model, t, q, v, load), slides, free))
     size = len(force)
     matrix = [[_held(mass[i][j], i, j, free) for j in range(size)] for i in range(size)]
     right = [free[i] * force[i] for i in range(size)]
-    for k in range(size):
-        for i in range(k + 1, size):
+    order = [*(i for i in range(size) if i not in late), *late]
+    for number, k in enumerate(order):
+        for i in order[number + 1 :]:
             if is_zero(matrix[i][k]):
                 continue
             factor = matrix[i][k] / matrix[k][k]
-            for j in range(k + 1, size):
+            for j in order[number + 1 :]:
                 matrix[i][j] = matrix[i][j] - factor * matrix[k][j]
             right[i] = right[i] - factor * right[k]
     solved: list[Any] = [0.0] * size
-    for i in reversed(range(size)):
+    for number, i in reversed([*enumerate(order)]):
         value = right[i]
-        for j in range(i + 1, size):
+        for j in order[number + 1 :]:
             if not is_zero(matrix[i][j]):
                 value = value - matrix[i][j] * solved[j]
         solved[i] = value / matrix[i][i]
     return solved
 
 
+def _add_frictions(model: Model, v: Any, mass: list[list[Any]], force: list[Any], given: tuple[Any, ...]) -> list[int]:
+    """Add the forces of frictions that slide to the rows M and r; returns the places of those in contacts."""
+    names, (normals, slides, free), late = model.coordinates, given, dict[int, None]()
+    rates = v if len(names) > 1 else [v]
+    for friction, normal, s in zip(model.frictions, normals, slides, strict=False):
+        place = names.index(friction.coordinate)
+        if friction.contact is None:
+            force[place] = force[place] - friction.slipping(rates[place], s) * normal
+    for friction, s in zip(model.frictions, slides, strict=False):
+        if friction.contact is not None:
+            place, contact = names.index(friction.coordinate), _contact_of(model, friction)
+            held = names.index(contact.coordinate)
+            share = contact.sign * friction.slipping(rates[place], s) * (1.0 - free[held])
+            mass[place] = [a if is_zero(b) else a + share * b for a, b in zip(mass[place], mass[held], strict=True)]
+            force[place] = force[place] + share * force[held]
+            late[place] = None
+    return list(late)
+
+
+def _contact_of(model: Model, friction: Friction) -> Contact:
+    """The contact whose reaction presses a friction."""
+    return next(contact for contact in model.contacts if contact.name == friction.contact)
+
+
 def reactions(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any, slides: Sequence[Any] = ()) -> list[Any]:
-    """The force of each contact along its sign, sign (M a - r)_i; 0 where its coordinate is free."""
-    lacking = _lacking(model, t, q, v, a, _on_sides(model, load, slides))
-    return [contact.sign * lacking[model.coordinates.index(contact.coordinate)] for contact in model.contacts]
+    """The force of each contact along its sign, sign (M a - r)_i; 0 where its coordinate is free.
+
+    r then has the force of a friction along this coordinate. While it sticks it carries what it can, so that the force is
+    sign (M a - r)_i + mu_s N, which vanishes when the friction cannot hold the coordinate alone any more. Without `slides` it
+    does what it does in a closed contact.
+    """
+    slides = slides if len(slides) else [np.sign(-friction.ground_speed) for friction in model.frictions]
+    lacking, names = _lacking(model, t, q, v, a, _on_sides(model, load, slides)), model.coordinates
+    found = [contact.sign * lacking[names.index(contact.coordinate)] for contact in model.contacts]
+    for friction, normal, s in zip(model.frictions, _pressing(model, t, q, v, load, lacking), slides, strict=False):
+        for i, contact in enumerate(model.contacts):
+            if contact.coordinate == friction.coordinate:
+                slips = friction.slipping(v[names.index(friction.coordinate)] if len(names) > 1 else v, s)
+                found[i] = found[i] + (contact.sign * slips + (1.0 - s * s) * friction.most) * normal
+    return found
 
 
 def stick_margins(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any, slides: Sequence[Any] = ()) -> list[Any]:
     """mu_s N - l and mu_s N + l of each friction, one after the other, with the force l = (M a - r)_i that makes it stick."""
     lacking, margins = _lacking(model, t, q, v, a, _on_sides(model, load, slides)), []
-    for friction, normal in zip(model.frictions, normal_forces(model, t, q, v, load), strict=True):
+    for friction, normal in zip(model.frictions, _pressing(model, t, q, v, load, lacking), strict=True):
         force, most = lacking[model.coordinates.index(friction.coordinate)], friction.most * normal
         margins += [most - force, most + force]
     return margins
+
+
+def _pressing(model: Model, t: Any, q: Any, v: Any, load: Any, lacking: Sequence[Any]) -> list[Any]:
+    """The normal force of each friction, from M a - r."""
+    forces = list(normal_forces(model, t, q, v, load))
+    for k, friction in enumerate(model.frictions):
+        if friction.contact is not None:
+            contact = _contact_of(model, friction)
+            forces[k] = contact.sign * lacking[model.coordinates.index(contact.coordinate)]
+    return forces
 
 
 def normal_forces(model: Any, t: Any, q: Any, v: Any, load: Any) -> tuple[Any, ...]:
@@ -396,10 +468,41 @@ def normal_forces(model: Any, t: Any, q: Any, v: Any, load: Any) -> tuple[Any, .
     return tuple(given)
 
 
-def normal_limits(model: Model, t: Any, q: Any, v: Any, load: Any) -> dict[str, Any]:
-    """The normal force of each friction, by the name of the limit at which a motion ends where it vanishes."""
-    forces = normal_forces(model, t, q, v, load)
-    return {friction.limit: force for friction, force in zip(model.frictions, forces, strict=True)}
+def friction_margins(
+    model: Model, t: Any, q: Any, v: Any, load: Any, free: Sequence[Any], slides: Sequence[Any]
+) -> dict[str, Any]:
+    """What must stay positive for each friction, by the name of the limit at which a motion ends where it vanishes.
+
+    That is the normal force. Of one in a contact it decides whether a reaction is the only one: with the Schur complement m of M
+    over the free coordinates, t of the friction and n of the contact along its sign, m_tt + s mu m_nt, and where it sticks
+    m_tt - mu abs(m_nt), with mu_s and times positive numbers.
+    """
+    forces, names = normal_forces(model, t, q, v, load), model.coordinates
+    found: dict[str, Any] = {}
+    for friction, force, s in zip(model.frictions, forces, slides, strict=False):
+        found[friction.limit] = force
+        if friction.contact is not None:
+            place, contact = names.index(friction.coordinate), _contact_of(model, friction)
+            own, across = schur_complement(mass_rows(model, q), place, names.index(contact.coordinate), free)
+            rubs = friction.most * (1.0 - free[names.index(contact.coordinate)]) * across
+            found[friction.limit] = (own + contact.sign * s * rubs) * (own * own - (1.0 - s * s) * rubs * rubs)
+    return found
+
+
+def schur_complement(mass: Sequence[Sequence[Any]], place: int, held: int, free: Sequence[Any]) -> tuple[Any, Any]:
+    """The entries (t, t) and (n, t) of the mass matrix, t = `place` and n = `held`, after the elimination of the other free
+    coordinates."""
+    others = [k for k in range(len(mass)) if k not in (place, held)]
+    masks = [1.0 if k in (place, held) else f for k, f in enumerate(free)]
+    rows = [[_held(entry, i, j, masks) for j, entry in enumerate(row)] for i, row in enumerate(mass)]
+    for number, k in enumerate(others):
+        later = others[number + 1 :]
+        for i in (*later, place, held):
+            if not is_zero(rows[i][k]):
+                factor = rows[i][k] / rows[k][k]
+                for j in (*later, place):
+                    rows[i][j] = rows[i][j] - factor * rows[k][j]
+    return rows[place][place], rows[held][place]
 
 
 def _lacking(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any) -> list[Any]:
@@ -408,20 +511,16 @@ def _lacking(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any) 
     return [sum(m * x for m, x in zip(row, a, strict=True) if not is_zero(m)) - r for row, r in zip(mass, force, strict=True)]
 
 
-def apart(model: Model, mass: Sequence[Sequence[Any]]) -> bool:
-    """Whether the mass matrix connects no coordinate with a contact to one with a friction, whatever the state."""
-    names, near = model.coordinates, {contact.coordinate for contact in model.contacts}
-    for _ in names:
-        near |= {b for a in near for b in names if not is_zero(mass[names.index(a)][names.index(b)])}
-    return not any(friction.coordinate in near for friction in model.frictions)
-
-
 def mass_and_force(model: Any, t: Any, q: Any, v: Any, load: Any) -> tuple[list[list[Any]], list[Any]]:
     """M(q) as rows and r(t, q, v) as a list, for any number of coordinates."""
-    mass, force = model.mass_matrix(q), model.force(t, q, v, load, *sides_for(model, t, q, load))
-    if len(model.coordinates) == 1:
-        return [[mass]], [force]
-    return [list(row) for row in mass], list(force)
+    force = model.force(t, q, v, load, *sides_for(model, t, q, load))
+    return mass_rows(model, q), [force] if len(model.coordinates) == 1 else list(force)
+
+
+def mass_rows(model: Any, q: Any) -> list[list[Any]]:
+    """M(q) as rows, for any number of coordinates."""
+    mass = model.mass_matrix(q)
+    return [[mass]] if len(model.coordinates) == 1 else [list(row) for row in mass]
 
 
 def _on_sides(model: Any, load: Any, slides: Sequence[Any]) -> Any:

@@ -15,8 +15,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from saltus.errors import ParameterError
-from saltus.systems.contact_model import Contact, ContactModel, Surface, is_zero
+from saltus.systems.contact_model import Contact, ContactModel, Friction, Surface, is_zero
 
+Part = Contact | Surface | Friction
 CLOSED_BELOW = 1e-13  # A contact is closed, up to rounding, if both its gap and its speed are smaller than this.
 
 
@@ -28,6 +29,7 @@ class GapPlaces:
     order: tuple[int, ...]  # the places of sums, in the order in which their terms are eliminated
     contacts: tuple[tuple[int, int], ...]  # the place of each contact's sum, and +1, or -1 if the coordinate is minus the sum
     surfaces: tuple[tuple[int, int], ...]  # of each surface likewise
+    frictions: tuple[tuple[int, int], ...]  # and of each friction
 
 
 class InGapCoordinates(ContactModel):
@@ -61,6 +63,15 @@ class InGapCoordinates(ContactModel):
         """The surfaces, each of one of the coordinates."""
         return self._on_coordinates(super().surfaces, self.places.surfaces)
 
+    @property
+    def frictions(self) -> tuple[Friction, ...]:
+        """The frictions, each along one of the coordinates."""
+        places = zip(super().frictions, self.places.frictions, strict=True)
+        return tuple(
+            replace(part, coordinate=self.coordinates[i], ground_speed=part.ground_speed if s > 0 else -part.ground_speed)
+            for part, (i, s) in places
+        )
+
     def _on_coordinates(self, parts: Any, places: tuple[tuple[int, int], ...]) -> tuple[Any, ...]:
         """Contacts or surfaces of single coordinates."""
         return tuple(
@@ -82,8 +93,9 @@ class InGapCoordinates(ContactModel):
         names = super().coordinates
         rows = [[float(i == j) for j in range(len(names))] for i in range(len(names))]
         moving: list[dict[str, Any]] = [{} for _ in names]
-        parts: list[Contact | Surface] = [*super().contacts, *super().surfaces]
-        for part, (i, sign) in zip(parts, self.places.contacts + self.places.surfaces, strict=True):
+        parts: list[Part] = [*super().contacts, *super().surfaces, *super().frictions]
+        places = self.places.contacts + self.places.surfaces + self.places.frictions
+        for part, (i, sign) in zip(parts, places, strict=True):
             if sign > 0 and i in self.places.order:
                 given = terms_of(part)
                 rows[i] = [given.get(name, 0.0) for name in names]
@@ -193,7 +205,7 @@ def _class_in(cls: Any, places: GapPlaces) -> Any:
 IN_GAPS = "InGapCoordinates"  # behind the name of a model's class, the name of its class in these coordinates
 
 
-def terms_of(contact: Contact | Surface) -> dict[str, Any]:
+def terms_of(contact: Part) -> dict[str, Any]:
     """The coefficients of the coordinates and load channels in the sum that a contact keeps on one side of its position."""
     return {contact.coordinate: 1.0} if isinstance(contact.coordinate, str) else dict(contact.coordinate)
 
@@ -204,12 +216,12 @@ def _places_of(model: Any) -> GapPlaces | None:
     Each sum takes the place of that of its coordinates which has the largest coefficient after the elimination of the earlier
     sums, of several the last. Coordinates that a contact holds alone, or along which a friction acts, keep their places.
     """
-    contacts, names, order = (*model.contacts, *model.surfaces), model.coordinates, []
+    contacts, names, order = (*model.contacts, *model.surfaces, *model.frictions), model.coordinates, []
     if all(isinstance(contact.coordinate, str) for contact in contacts):
         return None
     called, found = list(names), dict[int, tuple[int, int]]()
     rows = {names.index(part.coordinate): {part.coordinate: 1.0} for part in contacts if isinstance(part.coordinate, str)}
-    rubbed, reduced = {names.index(friction.coordinate) for friction in model.frictions}, dict[int, list[Fraction]]()
+    reduced = dict[int, list[Fraction]]()
     for number, contact in enumerate(contacts):
         terms = {name: float(factor) for name, factor in terms_of(contact).items()}
         turned = {name: -factor for name, factor in terms.items()}
@@ -218,30 +230,31 @@ def _places_of(model: Any) -> GapPlaces | None:
             left = [Fraction(terms.get(name, 0.0)) for name in names]
             for place, row in reduced.items():
                 left = [a - left[place] * b for a, b in zip(left, row, strict=True)]
-            free = [place for place in range(len(names)) if left[place] and place not in rows and place not in rubbed]
+            free = [place for place in range(len(names)) if left[place] and place not in rows]
             if not free:
-                raise ParameterError(_no_place(contact, contacts, rubbed), "model")
+                raise ParameterError(_no_place(contact, contacts), "model")
             place = max(free, key=lambda place: (abs(left[place]), place))
             rows[place], reduced[place], called[place] = terms, [a / left[place] for a in left], _called(contact)
             order.append(place)
             same = [(place, 1)]
         found[number] = same[0]
     count, every = len(model.contacts), tuple(found.values())
-    return GapPlaces(tuple(called), tuple(order), every[:count], every[count:])
+    last = count + len(model.surfaces)
+    return GapPlaces(tuple(called), tuple(order), every[:count], every[count:last], every[last:])
 
 
-def _no_place(contact: Contact | Surface, contacts: Sequence[Contact | Surface], rubbed: set[int]) -> str:
+def _no_place(contact: Part, contacts: Sequence[Part]) -> str:
     """Why a contact's sum cannot be a coordinate, in words."""
     others = ", ".join(other.name for other in contacts if other is not contact)
-    kept, beside = _called(contact), " and from the coordinates of frictions" * bool(rubbed)
+    kept = _called(contact)
     return (
-        f"the {type(contact).__name__.lower()} {contact.name!r} keeps {kept}, which follows from what {others} keep{beside}, up "
+        f"the {type(contact).__name__.lower()} {contact.name!r} keeps {kept}, which follows from what {others} keep, up "
         "to a displacement, so that it cannot be a coordinate beside them; leave it out, give sums that are the same the "
         "same coefficients, or let it keep a coordinate of its own, such as that of a heavy wall"
     )
 
 
-def _called(contact: Contact | Surface) -> str:
+def _called(contact: Part) -> str:
     """The name of a contact's sum, such as y_minus_x; with other coefficients than 1 and -1 it is called after the contact."""
     terms = {name: float(factor) for name, factor in terms_of(contact).items()}
     if any(abs(factor) != 1.0 for factor in terms.values()):

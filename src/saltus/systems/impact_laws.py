@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from saltus.checks import answered, check_number, settle_numbers
 from saltus.errors import ParameterError
-from saltus.systems.contact_model import Contact, ContactModel
+from saltus.systems.contact_model import Contact, ContactModel, mass_rows
 from saltus.systems.gap_coordinates import in_gap_coordinates
 from saltus.systems.load import Load
 from saltus.systems.model import Model, OneContactModel
@@ -23,6 +24,8 @@ class ImpactLaw:
     """
 
     __slots__ = ()
+
+    has_phases: ClassVar[bool] = False  # whether impulses e times those of a compression follow it
 
     def velocity_after(self, model: OneContactModel, t: Any, velocity: Any, side: Any, next_side: Any, load: Load) -> Any:
         """The velocity after an impact at `t` through which the motion passes from `side` to `next_side`.
@@ -254,6 +257,51 @@ class NewtonImpact(ImpactLaw):
         return matrix
 
 
+@dataclass(frozen=True, slots=True)
+class PoissonImpact(NewtonImpact):
+    """Two phases: a compression that ends as the law of `NewtonImpact` with e = 0, and an expansion with impulses e times those.
+
+    Both have friction where the contact has one. In the expansion an impulse is larger where its contact would close again. With
+    one contact whose friction does not act on its gap, v+ = -e v- as in Newton's law; else a contact may have a speed after it
+    that it had none of before. For models with frictions in contacts.
+
+    Parameters
+    ----------
+    e
+        The ratio of the impulses, for all contacts or a tuple with one for each; in [0, 1].
+    transfer
+        0.
+
+    Examples
+    --------
+    >>> saltus.PoissonImpact(e=0.5).has_phases
+    True
+    """
+
+    has_phases: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        NewtonImpact.__post_init__(self)
+        if self.transfer:
+            raise ParameterError(f"PoissonImpact has no transfer, got {self.transfer:g}; NewtonImpact has one", "transfer")
+
+    def check_one_contact(self, model: OneContactModel) -> None:
+        """Refuse: with one contact NewtonImpact is the same."""
+        raise ParameterError(
+            f"a {type(model).__name__} has one contact without friction, where NewtonImpact is the same", "impact"
+        )
+
+    def restitution_matrix(self, model: Model) -> list[list[Any]]:
+        """The ratios on the diagonal, for a model with frictions in its contacts."""
+        if not model.rubs_in_contacts:
+            raise ParameterError(
+                f"PoissonImpact is followed where contacts have friction, and those of {type(model).__name__} have none: give "
+                "NewtonImpact(e=...)",
+                "impact",
+            )
+        return NewtonImpact.restitution_matrix(self, model)
+
+
 @answered
 def energy_gain(model: ContactModel, impact: ImpactLaw) -> dict[str, float]:
     """The largest relative gain of kinetic energy by an impact at each contact; the energy is not raised where it is <= 0.
@@ -301,3 +349,39 @@ def energy_gains(model: Any, impact: Any, shape: tuple[int, ...] = ()) -> dict[s
         energy = [(v * (mass @ v[..., None])[..., 0]).sum(axis=-1) for v in (left, before)]
         gain[contact.name] = energy[0] / energy[1] - 1.0
     return gain
+
+
+def check_paradox(model: ContactModel) -> None:
+    """Refuse frictions in contacts that slide with no reaction, or with several: Painleve's paradox, of a constant mass matrix.
+
+    The sliding of frictions with the directions s adds s mu (M a - r)_n to their rows, and the reactions are the only ones if the
+    determinant of the rows and columns of the coordinates that are free stays positive, whichever these are.
+    """
+    pressed = [friction for friction in model.frictions if friction.contact is not None]
+    if any(friction.limit in model.friction_limits for friction in pressed):
+        return  # it depends on the state, and ends a motion there
+    names, contacts = model.coordinates, {contact.name: contact for contact in model.contacts}
+    mass = np.array(mass_rows(model, (0.5,) * len(names)), dtype=float)
+    places = [(names.index(f.coordinate), contacts[str(f.contact)]) for f in pressed]
+    own = {place for t, contact in places for place in (t, names.index(contact.coordinate))}
+    parts = (*model.contacts, *model.frictions)
+    others = sorted({names.index(part.coordinate) for part in parts} - own) if mass[list(own)].any() else []
+    for held in itertools.product((False, True), repeat=len(others)):
+        for ways in itertools.product((None, 0, 1, -1), repeat=len(pressed)):
+            rows, fixed = mass.copy(), {place for place, is_held in zip(others, held, strict=True) if is_held}
+            for friction, (t, contact), way in zip(pressed, places, ways, strict=True):
+                n = names.index(contact.coordinate)
+                fixed |= set() if way is None else {n} if way else {n, t}
+                rows[t] = rows[t] + (way or 0) * contact.sign * float(friction.most) * mass[n]
+            free = [place for place in range(len(names)) if place not in fixed]
+            share = np.linalg.det(rows[np.ix_(free, free)]) / np.linalg.det(mass[np.ix_(free, free)]) if free else 1.0
+            if share <= 0.0:
+                slip = ", ".join(
+                    f"{f.name} {'forwards' if s > 0 else 'backwards'}" for f, s in zip(pressed, ways, strict=True) if s
+                )
+                raise ParameterError(
+                    f"while {slip} slides, a contact of {type(model).__name__} has no reaction or several (Painleve's paradox): "
+                    f"1 + s mu m_nt / m_tt must be positive and is {share:.6g}, with the mass matrix m of what is free; choose a "
+                    "smaller coefficient",
+                    "model",
+                )

@@ -160,3 +160,22 @@ def reversed_load(load: Load, *endings: str) -> Load:
     """A load in which the channels whose names have one of these endings, such as "horizontal", have the other sign."""
     signals = {name: scaled(signal, -1.0) if name.endswith(endings) else signal for name, signal in load.channels.items()}
     return Load(frequency=load.frequency, **signals)
+
+
+class Sides(dict[str, Any]):
+    """The sides of a model's surfaces, +1 or -1, by their names: `sides.stop` or `sides["stop"]`."""
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in self:
+            raise ParameterError(f"no surface {name!r}; {near(name, self)}", "sides")
+        return self[name]
+
+
+class LoadOnSides:
+    """A load together with the sides on which the equations are asked for."""
+
+    def __init__(self, load: Any, sides: Sides) -> None:
+        self._load, self.sides = load, sides
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._load, name)

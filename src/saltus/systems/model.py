@@ -117,6 +117,16 @@ class Model:
         return ()
 
     @property
+    def rubs_in_contacts(self) -> bool:
+        """Whether the reaction of any of its contacts presses a friction."""
+        return any(friction.contact is not None for friction in self.frictions)
+
+    @property
+    def friction_limits(self) -> tuple[str, ...]:
+        """The limits at which its frictions end a motion."""
+        return ()
+
+    @property
     def surfaces(self) -> tuple[Surface, ...]:
         """The surfaces on whose sides the equations differ; a `ContactModel` may have some."""
         return ()

@@ -12,16 +12,9 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import ParameterError, SaltusError, shown
-from saltus.systems.contact_model import (
-    MOST_CONTACTS,
-    MOST_FRICTIONS,
-    Contact,
-    ContactModel,
-    Surface,
-    sides_for,
-)
-from saltus.systems.gap_coordinates import InGapCoordinates
-from saltus.systems.impact_laws import ImpactLaw
+from saltus.systems.contact_model import MOST_CONTACTS, MOST_FRICTIONS, Contact, ContactModel, Surface, sides_for
+from saltus.systems.gap_coordinates import InGapCoordinates, Part
+from saltus.systems.impact_laws import ImpactLaw, check_paradox
 from saltus.systems.load import DeclaredLoad, Load
 from saltus.systems.model import Model, OneContactModel, check_one_contact
 
@@ -231,7 +224,8 @@ def check_contact_model(model: ContactModel) -> bool:
     if model.sides:
         raise ParameterError(f"{kind} is a ContactModel, so it has no sides: leave them out", "model")
     rows = len(frictions) + len(model.surfaces)
-    given = (("frictions and surfaces", rows, MOST_FRICTIONS), ("contacts", len(contacts), MOST_CONTACTS - 2 * rows))
+    most = MOST_FRICTIONS if model.rubs_in_contacts else MOST_CONTACTS - 2 * rows
+    given = (("frictions and surfaces", rows, MOST_FRICTIONS), ("contacts", len(contacts), most))
     for what, count, most in given:
         if count > most:
             raise ParameterError(f"{kind} has {count} {what}, and at most {most} can be followed", "model")
@@ -251,20 +245,35 @@ def check_contact_model(model: ContactModel) -> bool:
         for b in contacts:
             if a is not b and a.coordinate == b.coordinate and not (a.sign != b.sign and b.gap(a.position) > 0.0):
                 raise ParameterError(f"the contacts {a.name!r} and {b.name!r} leave {a.coordinate} no room between them", "model")
-    _check_frictions(model, [contact.coordinate for contact in contacts])
+    _check_frictions(model)
     _check_mass(model)
-    return any(not isinstance(part.coordinate, str) for part in parts)
+    sums = any(not isinstance(part.coordinate, str) for part in (*parts, *frictions))
+    if model.rubs_in_contacts and not sums:
+        check_paradox(model)
+    return sums
 
 
-def _check_frictions(model: ContactModel, taken: list[Any]) -> None:
+def _check_frictions(model: ContactModel) -> None:
     """Refuse frictions on coordinates that they cannot hold, or with coefficients without meaning."""
-    kind = type(model).__name__
+    kind, taken, pressed = type(model).__name__, list[Any](), [friction.contact for friction in model.frictions]
     for friction in model.frictions:
         where = f"the friction {friction.name!r} of {kind}"
-        if friction.coordinate not in model.coordinates:
+        if isinstance(friction.coordinate, str) and friction.coordinate not in model.coordinates:
             raise ParameterError(f"{where} holds {friction.coordinate!r}, none of {', '.join(model.coordinates)}", "model")
+        if not isinstance(friction.coordinate, str):
+            _check_sum(model, friction)
         if friction.coordinate in taken:
-            raise ParameterError(f"{where} and something else hold {friction.coordinate}: take two coordinates", "model")
+            raise ParameterError(f"{where} and another one hold {friction.coordinate}: take two coordinates", "model")
+        if friction.contact is not None and friction.contact not in [contact.name for contact in model.contacts]:
+            raise ParameterError(f"{where} is in the contact {shown(friction.contact)}, which {kind} does not have", "model")
+        if friction.contact is not None and pressed.count(friction.contact) > 1:
+            raise ParameterError(f"{where} is in the contact {friction.contact!r}, as another one is: one is followed", "model")
+        for other in (c for c in model.contacts if c.name == friction.contact):
+            if other.coordinate in [each.coordinate for each in model.frictions]:
+                way = f"along whose coordinate {other.coordinate} a friction acts: take another one"
+                raise ParameterError(f"{where} is in the contact {other.name!r}, {way}", "model")
+        if friction.stribeck_speed is not None and not float(friction.stribeck_speed) > 0.0:
+            raise ParameterError(f"{where} must have stribeck_speed > 0, got {float(friction.stribeck_speed):g}", "model")
         if not 0.0 <= float(friction.kinetic) <= float(friction.most):
             pair = f"kinetic = {float(friction.kinetic):g} and static = {float(friction.most):g}"
             raise ParameterError(f"{where} must have 0 <= kinetic <= static, got {pair}", "model")
@@ -325,7 +334,7 @@ def _is_row(found: Any) -> bool:
     return isinstance(found, (tuple, list)) or (isinstance(found, np.ndarray) and found.ndim > 0)
 
 
-def _check_sum(model: ContactModel, contact: Contact | Surface) -> None:
+def _check_sum(model: ContactModel, contact: Part) -> None:
     """Refuse a sum of coordinates and displacements of the ground that a contact cannot keep on one side."""
     where = f"the {type(contact).__name__.lower()} {contact.name!r} of {type(model).__name__}"
     names, given = model.coordinates, contact.coordinate

@@ -170,7 +170,9 @@ MODELS = NamedTypes(
     dict.fromkeys(("Metainterface", "RockingBlock", "TwoLayer", "WallOscillator", "TwoStops", "ImpactPair", "BeltOscillator"))
     | {"CellChain": None, "Structure": None}
 )
-IMPACTS = NamedTypes(dict.fromkeys(("VelocityReduction", "EnergyRestitution", "InelasticImpact", "NewtonImpact")))
+IMPACTS = NamedTypes(
+    dict.fromkeys(("VelocityReduction", "EnergyRestitution", "InelasticImpact", "NewtonImpact", "PoissonImpact"))
+)
 PULSES = NamedTypes(dict.fromkeys(("HalfSine", "OneSine", "OneCosine", "MavroeidisPapageorgiou", "Ricker", "Ramp", "Chirp")))
 
 T = TypeVar("T", type[Model], type[ImpactLaw])

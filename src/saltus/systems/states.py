@@ -362,7 +362,8 @@ def held_values(system: System, state: np.ndarray, within: float, closed: int = 
             found |= {place: float(contact.position), speed: 0.0}
     for friction in system.model.frictions:
         place, ground_speed = len(names) + names.index(friction.coordinate), float(friction.ground_speed)
-        found |= {place: ground_speed} if abs(state[place] - ground_speed) < within else {}
+        touching = all(names.index(c.coordinate) in found for c in system.model.contacts if c.name == friction.contact)
+        found |= {place: ground_speed} if touching and abs(state[place] - ground_speed) < within else {}
     return found
 
 

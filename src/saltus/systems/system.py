@@ -12,7 +12,7 @@ import numpy as np
 from saltus.checks import Numbers
 from saltus.errors import ParameterError, near, shown
 from saltus.files import parsed_json
-from saltus.notebook import html_table
+from saltus.progress import html_table
 from saltus.systems.contact_model import ContactModel, normal_forces
 from saltus.systems.gap_coordinates import in_gap_coordinates
 from saltus.systems.impact_laws import ImpactLaw, VelocityReduction
@@ -431,19 +431,20 @@ def _contact_images(model: Model, impact: ImpactLaw) -> tuple[int, ...] | None:
     if model.surfaces or (isinstance(model, ContactModel) and model.jumps):
         return None  # those of surfaces and of jumps are not looked for
     contacts, frictions, count = model.contacts, model.frictions, len(model.contacts)
-    found = []
+    found, names = [], [contact.name for contact in contacts]
     for contact in contacts:
         wanted = (model.images[model.coordinates.index(contact.coordinate)], -contact.sign, -float(contact.position))
         same = [i for i, c in enumerate(contacts) if (c.coordinate, c.sign, float(c.position)) == wanted]
         found += same
     for friction in frictions:
-        numbers = (float(friction.kinetic), float(friction.most), -float(friction.ground_speed))
+        numbers = (float(friction.kinetic), float(friction.most), friction.stribeck_speed, -float(friction.ground_speed))
         image = (model.images[model.coordinates.index(friction.coordinate)], *numbers)
-        found += [
-            count + i
-            for i, f in enumerate(frictions)
-            if (f.coordinate, float(f.kinetic), float(f.most), float(f.ground_speed)) == image
-        ]
+        for i, f in enumerate(frictions):
+            own = (f.coordinate, float(f.kinetic), float(f.most), f.stribeck_speed, float(f.ground_speed))
+            pressed = [names.index(each.contact) if each.contact else None for each in (friction, f)]
+            image_of_its_own = None if pressed[0] is None else dict(enumerate(found)).get(pressed[0], -1)
+            alike = image_of_its_own == pressed[1]
+            found += [count + i] if own == image and alike else []
     if len(found) < count + len(frictions):
         return None
     if not count:

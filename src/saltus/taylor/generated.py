@@ -318,7 +318,8 @@ def _traced_parts(system: System) -> dict[str, str]:
         "contacts": [*traced.reactions, *traced.contact_numbers],
     }
     texts = {name: _text(traced, [root for root in parts if root is not None]) for name, parts in roots.items()}
-    texts |= {"margins": _margins(system), "signs": repr((traced.signs, traced.contact_coordinates, traced.friction_coordinates))}
+    signs = (traced.signs, traced.contact_coordinates, traced.friction_coordinates, *traced.friction_contacts)
+    texts |= {"margins": _margins(system), "signs": repr(signs)}
     return {name: digest(text) for name, text in texts.items()}
 
 

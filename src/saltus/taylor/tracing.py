@@ -12,9 +12,9 @@ from saltus.systems import (
     Harmonic,
     Pulse,
     System,
-    apart,
     constrained_acceleration,
-    normal_limits,
+    friction_margins,
+    mass_rows,
     numbers,
     reactions,
     stick_margins,
@@ -52,11 +52,10 @@ class Trace:
     `contact_acceleration`, the second derivative of the gap at rest at contact, a function of the time alone, and
     `contact_damping`, minus its derivative to the velocity; `next_side` and `velocity_after`, the reset; `margins` to stop at.
 
-    A model with several contacts has `reactions`, one for each; `mass`, the rows of the mass matrix one after the other;
-    `restitution`, the rows of E; and `positions` of the contacts. Its leaves include `free`, 1 for each coordinate that no
-    contact holds, else 0. A model with frictions has, behind the reactions of the contacts, the two margins of each friction
-    (`stick_margins`), and `ground_speeds`. Its leaves include `slide`, the direction in which each friction slides, 0 if it
-    sticks. A surface has rows like a friction, with margins of 1, its position in place of a speed, and as `slide` its side.
+    A model with several contacts has `reactions`; `mass`, the mass matrix row by row; `restitution`, the rows of E; `positions`.
+    Its leaves include `free`, 1 for each coordinate that no contact holds, else 0. With frictions there are, behind the
+    reactions, the two margins of each (`stick_margins`), `ground_speeds`, and the leaves `slide`, the direction in which each
+    slides, 0 if it sticks. A surface has rows as a friction, with margins of 1, its position, and its side.
 
     With a tangent `acceleration` goes on after the model's own `dof` with that of its `columns`. Column j is the derivative to
     the j-th initial coordinate, then to the j-th initial velocity, then to the number at the j-th of `paths`. With u = dq/dc and
@@ -94,6 +93,8 @@ class Trace:
     signs: tuple[int, ...] = ()  # of the contacts
     contact_coordinates: tuple[int, ...] = ()  # the coordinate that each contact holds
     ground_speeds: list[Expr] = field(default_factory=list)
+    coefficients: list[Expr] = field(default_factory=list)  # with frictions in contacts: `has_phases`, then each
+    friction_contacts: tuple[int, ...] = ()  # then the contact whose reaction presses each of them, -1 for none
     friction_coordinates: tuple[int, ...] = ()  # the coordinate of each friction, then -1 less that of each surface
     modes: ModeBlock | None = None  # of a structure; their accelerations are leaves "mode"
 
@@ -109,8 +110,8 @@ class Trace:
 
     @property
     def contact_numbers(self) -> list[Expr]:
-        """The mass matrix, E, the positions of the contacts, the jumps and the speeds of the grounds: what events need."""
-        return [*self.mass, *self.restitution, *self.positions, *self.jumps, *self.ground_speeds]
+        """The mass matrix, E, positions, jumps, coefficients of frictions in contacts, speeds of grounds: what events need."""
+        return [*self.mass, *self.restitution, *self.positions, *self.jumps, *self.coefficients, *self.ground_speeds]
 
     @property
     def local_rows(self) -> list[int]:
@@ -305,24 +306,23 @@ def _known_number(expression: Expr) -> float | Fraction | None:
 def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> list[Any]:
     """Trace the accelerations of a model with several contacts, for any choice of closed ones."""
     model, load, contacts, frictions = twin.contact_model, twin.load, twin.contact_model.contacts, twin.contact_model.frictions
-    local = getattr(model, "local_count", result.dof)
+    local, parts = getattr(model, "local_count", result.dof), (*frictions, *model.surfaces)
     if local < result.dof:
         q, v = local_parts(q, v, local)
-    slides = [Expr("slide", (), k) for k in range(len(frictions) + len(model.surfaces))]
-    mass = [[model.mass_matrix(q)]] if result.dof == 1 else [list(row) for row in model.mass_matrix(q)]
-    if frictions and not apart(model, mass):
-        raise TraceError(
-            f"the mass matrix of {type(model).__name__} connects a coordinate with a contact to one with a friction: impacts "
-            "would act on what sticks, which is not followed; choose coordinates in which it does not"
-        )
-    accelerations = [Expr("acceleration", (), i) for i in range(local)]
-    holding = [f for forces in (reactions, stick_margins) for f in forces(model, t, q, v, accelerations, load, slides)]
+    a, slides = ([Expr(op, (), i) for i in range(n)] for op, n in (("acceleration", local), ("slide", len(parts))))
+    holding = [f for forces in (reactions, stick_margins) for f in forces(model, t, q, v, a, load, slides)]
     result.reactions = [combine("add", r, 0.0) for r in (*holding, *[1.0] * (2 * len(model.surfaces)))]
-    speeds = [*(friction.ground_speed for friction in frictions), *(surface.position for surface in model.surfaces)]
-    result.ground_speeds = [combine("add", speed, 0.0) for speed in speeds]
-    rubbed, passed = ([model.coordinates.index(each.coordinate) for each in parts] for parts in (frictions, model.surfaces))
-    result.friction_coordinates = (*rubbed, *(-1 - place for place in passed))
+    if model.rubs_in_contacts:
+        given = float(twin.impact.has_phases), *(getattr(part, "kinetic", 0.0) for part in parts)
+        result.coefficients = [combine("add", mu, 0.0) for mu in given]
+        presses = {None: -1} | {contact.name: i for i, contact in enumerate(contacts)}
+        result.friction_contacts = tuple(presses[getattr(part, "contact", None)] for part in parts)
+    speeds = (*(friction.ground_speed for friction in frictions), *(surface.position for surface in model.surfaces))
+    result.ground_speeds = [combine("add", w, 0.0) for w in speeds]
+    places = [model.coordinates.index(part.coordinate) for part in parts]
+    result.friction_coordinates = tuple(p if k < len(frictions) else -1 - p for k, p in enumerate(places))
     zero, one, beyond = number(0.0), number(1.0), range(local, result.dof)
+    mass = mass_rows(model, q)
     result.mass = [x for row in mass for x in (*(combine("add", entry, 0.0) for entry in row), *(zero for _ in beyond))]
     result.mass += [one if i == j else zero for i in beyond for j in range(result.dof)]
     result.restitution = [combine("add", entry, 0.0) for row in twin.impact.restitution_matrix(model) for entry in row]
@@ -339,11 +339,11 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
 
 
 def _trace_margins(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any, side: Expr, stop_at: tuple[str, ...]) -> None:
-    if not stop_at:
-        return
     a = tuple(Expr("acceleration", (), i) for i in range(result.dof))
-    margins = dict(ask(twin.model, "margins", t, q, v, a[0] if result.dof == 1 else a, side, twin.load))
-    margins |= normal_limits(twin.model, t, q, v, twin.load)
+    margins = dict(ask(twin.model, "margins", t, q, v, a[0] if result.dof == 1 else a, side, twin.load)) if stop_at else {}
+    if result.several and stop_at:
+        free, slides = ([Expr(op, (), i) for i in range(result.dof + len(result.ground_speeds))] for op in ("free", "slide"))
+        margins |= friction_margins(twin.model, t, q, v, twin.load, free, slides)
     for name in stop_at:
         if name not in margins:
             message = f"{type(twin.model).__name__} has no margin {name!r} to stop at; {near(name, margins)}"

@@ -216,9 +216,10 @@ class Explorer:
 def _check(system: System, function: str) -> None:
     """Refuse a system that a page cannot follow."""
     check_system(system, function, several_contacts=True, sums=False)
-    parts = {"surfaces": system.model.surfaces, "coordinates of first order": system.model.first_order}
-    for what in (what for what, given in parts.items() if given):
-        raise ParameterError(f"a page follows no {what} so far, and {type(system.model).__name__} has some", "system")
+    model = system.model
+    parts = {"surfaces": model.surfaces, "coordinates of first order": model.first_order}
+    for what in (what for what, given in (parts | {"frictions in contacts": model.rubs_in_contacts}).items() if given):
+        raise ParameterError(f"a page follows no {what} so far, and {type(model).__name__} has some", "system")
 
 
 def _motion(

@@ -29,13 +29,12 @@ import math
 
 import numpy as np
 
-from saltus.flow.contacts.complementarity import exchanged
-from saltus.flow.contacts.frictions import choose_slides, hold_frictions, slides_so
+from saltus.flow.contacts.complementarity import exchanged, fill_rubbing, is_pressed
+from saltus.flow.contacts.frictions import ALIKE, choose_slides, hold_frictions, rubs_along, slides_so
 from saltus.flow.contacts.impacts import (
     apply_impulses,
     bring_to_rest,
     closed_bits,
-    contact_position,
     fill_after,
     fill_contact_matrices,
     gap_series,
@@ -44,8 +43,19 @@ from saltus.flow.contacts.impacts import (
     jump_first_order,
     record_contact_event,
     settle_contact,
+    undecide,
 )
-from saltus.flow.contacts.layout import APART, MOST_TRIED, TIED, ContactColumn, ImpactDetail, copy_all
+from saltus.flow.contacts.layout import (
+    APART,
+    MOST_TRIED,
+    TIED,
+    ContactColumn,
+    FrictionColumn,
+    ImpactDetail,
+    contact_position,
+    copy_all,
+)
+from saltus.flow.contacts.rubbing import rest_columns, rubbing_impact
 from saltus.flow.contacts.tangent import (
     clear_shifts,
     closing_columns,
@@ -57,7 +67,6 @@ from saltus.flow.contacts.tangent import (
     move_columns,
     note_shifts,
     note_velocities,
-    rest_columns,
     slope,
 )
 from saltus.flow.kernel.layout import EventCode, Status
@@ -83,6 +92,8 @@ def violated(motion, candidates):
                 wrong |= 1 << i
         else:
             gap_series(motion, i, contact_position(motion, i), order, g)
+            if known == 1 and rubs_along(motion, i) and abs(g[2]) > ALIKE:
+                known = 0  # its friction has changed with the release
             k = leading(g, 2 + known, order)
             if k == order or g[k] < 0.0:
                 wrong |= 1 << i
@@ -127,11 +138,13 @@ def choose_closed(motion, candidates, still, t):
         return exchange_closed(motion, candidates, still, t)
     for number in range((1 << count) * 3 ** motion.frictions.shape[0]):
         choice = number & ((1 << count) - 1)  # the bits of those that open
-        if choice & ~candidates or not choose_slides(motion, still, number >> count):
+        if choice & ~candidates:
             continue
         for i in range(count):
             if candidates >> i & 1:
                 motion.contacts[i, ContactColumn.CLOSED] = 1 - (choice >> i & 1)
+        if not choose_slides(motion, still, number >> count):
+            continue
         hold_coordinates(motion)
         hold_frictions(motion)
         expand(motion, t, 1.0, motion.order)
@@ -189,6 +202,12 @@ def block_of(motion, hit, backwards):
                 a, b = motion.contacts[i, ContactColumn.COORDINATE], motion.contacts[k, ContactColumn.COORDINATE]
                 if joined[a] != joined[b] and is_there(motion, own * own + count * i + k):
                     joined[a] = joined[b] = grows = True
+        for k in range(motion.frictions.shape[0]):
+            if motion.frictions[k, FrictionColumn.PRESSED] > 0:
+                a = motion.contacts[motion.frictions[k, FrictionColumn.PRESSED] - 1, ContactColumn.COORDINATE]
+                b = motion.frictions[k, FrictionColumn.COORDINATE]
+                if joined[a] != joined[b]:
+                    joined[a] = joined[b] = grows = True
     for i in range(count):
         block |= 1 << i if joined[motion.contacts[i, ContactColumn.COORDINATE]] else 0
     return block
@@ -208,18 +227,26 @@ def impact_of(motion, t, hit):
         if hit >> i & 1:
             motion.rates[i] = min(motion.rates[i], 0.0)
         motion.gaps[i] = motion.rates[i]
-    solved, acts = impact_impulses(motion, chosen, motion.rates)
+    rubs, solved, acts = is_pressed(motion), True, 0
+    if not rubs:
+        solved, acts = impact_impulses(motion, chosen, motion.rates)
     if not (regular and solved):
         return -1
     jump_columns(motion, hit)
     jump_first_order(motion, hit)
-    apply_impulses(motion)
+    if rubs:
+        acts = rubbing_impact(motion, chosen, detail != ImpactDetail.NO_SPEED)
+        if acts < 0:
+            return -1
+    else:
+        apply_impulses(motion)
     for i in range(count):
         if chosen >> i & 1:
             settle_contact(motion, i, motion.rates[i])
     if motion.columns > 0 and detail != ImpactDetail.NO_SPEED:
-        note_velocities(motion, -1.0)
-        impulse_columns(motion, acts, chosen)
+        if not rubs:
+            note_velocities(motion, -1.0)
+            impulse_columns(motion, acts, chosen)
         hold_columns(motion, chosen)
     return detail
 
@@ -236,14 +263,6 @@ def rates_between(motion, t, hit):
     hold_frictions(motion)
     expand(motion, t, 1.0, 0)
     return candidates & ~closed_bits(motion)
-
-
-@lean_jit
-def undecide(motion, opened):
-    """Close those contacts in `opened` again that are at rest: which of them stay closed is decided later."""
-    for i in range(motion.contacts.shape[0]):
-        if opened >> i & 1 and motion.velocities[motion.contacts[i, ContactColumn.COORDINATE]] == 0.0:
-            motion.contacts[i, ContactColumn.CLOSED] = 1
 
 
 @lean_jit
@@ -367,6 +386,9 @@ def rests_in_a_row(motion, t, near):
         near, jumped = near & ~block, jumped & ~block
         jump_columns(motion, block)
         jump_first_order(motion, block)
+        if is_pressed(motion):
+            fill_contact_matrices(motion)
+            fill_rubbing(motion)
         bring_to_rest(motion, block)
         if motion.columns > 0:
             rest_columns(motion, block)

@@ -1,4 +1,5 @@
-"""Linear complementarity problems of contacts: of a few solved by trying all sets of acting contacts, of many by exchanges.
+"""Linear complementarity problems of contacts: of a few solved by trying all sets of acting contacts, of many by exchanges; and
+impulses of frictions.
 
 An exchange adds the rows of which the inequality is violated to those that act, or takes them away. All of them are exchanged as
 long as fewer and fewer are violated, and else the first one alone. With the first one alone the method ends at the only solution
@@ -11,7 +12,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.flow.contacts.layout import MOST_TRIED, VIOLATED
+from saltus.flow.contacts.layout import (
+    MOST_TRIED,
+    VIOLATED,
+    ContactColumn,
+    FrictionColumn,
+    FrictionImpact,
+    ground_speed,
+    restitution,
+    rub_coefficient,
+)
 from saltus.taylor import lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
@@ -139,3 +149,202 @@ def complementary(matrix, right, size, block, tried, z):
         if worst <= 0.0:
             break
     return least <= VIOLATED * scale, found
+
+
+# --- impacts with friction -------------------------------------------------------------------------------------------------
+
+
+@lean_jit
+def is_pressed(motion):
+    """Whether the reaction of any contact presses a friction."""
+    found = False
+    for k in range(motion.frictions.shape[0]):
+        found = found or motion.frictions[k, FrictionColumn.PRESSED] > 0
+    return found
+
+
+@lean_jit
+def rub_of(motion, i):
+    """The friction that a contact's reaction presses, or -1."""
+    for k in range(motion.frictions.shape[0]):
+        if motion.frictions[k, FrictionColumn.PRESSED] == i + 1:
+            return k
+    return -1
+
+
+@lean_jit
+def slip_sign(motion, k):
+    """The direction in which a friction slides after the impact, +1 or -1; 0 if it has no impulse or sticks."""
+    way = motion.frictions[k, FrictionColumn.STRUCK]
+    return 1.0 if way == FrictionImpact.FORWARDS else -1.0 if way == FrictionImpact.BACKWARDS else 0.0
+
+
+@lean_jit
+def push(motion, a, i):
+    """The velocity that an impulse 1 of a contact, with that of its friction if this slides, gives to coordinate a."""
+    gain, k = motion.inverse[a, motion.contacts[i, ContactColumn.COORDINATE]] * motion.signs[i], rub_of(motion, i)
+    if k >= 0:
+        slips = slip_sign(motion, k) * rub_coefficient(motion, k)
+        gain -= slips * motion.inverse[a, motion.frictions[k, FrictionColumn.COORDINATE]]
+    return gain
+
+
+@lean_jit
+def fill_rubbing(motion):
+    """Let impulses of frictions in contacts act along with those of the contacts in `INVERSE` and `COUPLING`: they slide on in
+    their directions, or go on having the speed of the ground."""
+    own, inverse = motion.own, motion.inverse
+    for k in range(motion.frictions.shape[0]):
+        if motion.frictions[k, FrictionColumn.PRESSED] > 0:
+            c = motion.frictions[k, FrictionColumn.COORDINATE]
+            rate = motion.velocities[c] - ground_speed(motion, k)
+            motion.frictions[k, FrictionColumn.STRUCK] = (
+                FrictionImpact.FORWARDS if rate > 0.0 else FrictionImpact.BACKWARDS if rate < 0.0 else FrictionImpact.STUCK
+            )
+            own_inverse = inverse[c, c]
+            for a in range(own if rate == 0.0 else 0):
+                across = inverse[a, c] / own_inverse
+                for b in range(own):
+                    if a != c:
+                        inverse[a, b] -= across * inverse[c, b]
+            for b in range(own if rate == 0.0 else 0):
+                inverse[c, b] = 0.0
+    for i in range(motion.contacts.shape[0]):
+        for j in range(motion.contacts.shape[0]):
+            motion.coupling[i, j] = motion.signs[i] * push(motion, motion.contacts[i, ContactColumn.COORDINATE], j)
+
+
+@lean_jit
+def slides_on(motion, near):
+    """Whether the frictions in the contacts in `near` will not change what they do while these contacts lose their speeds.
+
+    If so they are let act along with them (`fill_rubbing`). A contact with the speed u and the restitution e has impulses of
+    (1 + e) / (1 - e) u times its mass until it rests.
+    """
+    speed, on = 0.0, True
+    for i in range(motion.contacts.shape[0]):
+        if near >> i & 1:
+            e = restitution(motion, i, i)
+            speed = max(speed, abs(motion.rates[i]) * (1.0 + e) / (1.0 - e) if e < 1.0 else np.inf)
+    for k in range(motion.frictions.shape[0]):
+        i = motion.frictions[k, FrictionColumn.PRESSED] - 1
+        if i >= 0 and near >> i & 1:
+            c, mu = motion.frictions[k, FrictionColumn.COORDINATE], rub_coefficient(motion, k)
+            rate, across = abs(motion.velocities[c] - ground_speed(motion, k)), motion.contacts[i, ContactColumn.COORDINATE]
+            if rate == 0.0:
+                on = on and abs(motion.inverse[c, across]) <= mu * motion.inverse[c, c]
+            else:
+                on = on and rate * motion.coupling[i, i] > mu * motion.inverse[c, c] * speed
+    if on and is_pressed(motion):
+        fill_rubbing(motion)
+    return on
+
+
+@lean_jit
+def choose_ways(motion, chosen, acts, number):
+    """Let each friction that has an impulse at an impact stick or slide, by the base-3 digits of `number`; False if another
+    one has a digit other than 0. `impulses` are those that the contacts have besides those of the contacts in `acts`."""
+    for k in range(motion.frictions.shape[0]):
+        digit, number, contact = number % 3, number // 3, motion.frictions[k, FrictionColumn.PRESSED] - 1
+        pushed = contact >= 0 and chosen >> contact & 1
+        if pushed and (acts >> contact & 1 or motion.impulses[contact] > 0.0):
+            motion.frictions[k, FrictionColumn.STRUCK] = FrictionImpact.STUCK + digit
+        else:
+            motion.frictions[k, FrictionColumn.STRUCK] = FrictionImpact.NOT
+            if digit > 0:
+                return False
+    return True
+
+
+@lean_jit
+def fill_sticking(motion, row, a, acts, last):
+    """Fill a row of `block` with what the impulses of the contacts in `acts`, then those of sticking frictions, give to
+    coordinate a; behind them comes `last`."""
+    column, block = 0, motion.block
+    for j in range(motion.contacts.shape[0]):
+        if acts >> j & 1:
+            block[row, column] = push(motion, a, j)
+            column += 1
+    for k in range(motion.frictions.shape[0]):
+        if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
+            block[row, column] = motion.inverse[a, motion.frictions[k, FrictionColumn.COORDINATE]]
+            column += 1
+    block[row, column] = last
+
+
+@lean_jit
+def unknown_impulses(motion, acts):
+    """The number of impulses that are solved for: those of contacts in `acts` and of sticking frictions."""
+    size = 0
+    for i in range(motion.contacts.shape[0]):
+        size += acts >> i & 1
+    for k in range(motion.frictions.shape[0]):
+        size += 1 if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK else 0
+    return size
+
+
+@lean_jit
+def struck_velocities(motion, acts, after):
+    """Solve for the impulses of the contacts in `acts` with the ways of frictions that are chosen; `after` then has the
+    velocities. False if there is no solution. The rates of these contacts become -`right`, and sticking coordinates have the
+    speeds of their grounds.
+    """
+    own, count, row, size = motion.own, motion.contacts.shape[0], 0, unknown_impulses(motion, acts)
+    for a in range(own):
+        after[a] = motion.velocities[a]
+        for j in range(count):
+            after[a] += push(motion, a, j) * motion.impulses[j] if motion.impulses[j] != 0.0 else 0.0
+    for i in range(count):
+        if acts >> i & 1:
+            a = motion.contacts[i, ContactColumn.COORDINATE]
+            fill_sticking(motion, row, a, acts, -motion.signs[i] * motion.right[i] - after[a])
+            row += 1
+    for k in range(motion.frictions.shape[0]):
+        if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
+            a = motion.frictions[k, FrictionColumn.COORDINATE]
+            fill_sticking(motion, row, a, acts, ground_speed(motion, k) - after[a])
+            row += 1
+    if not eliminate(motion.block, size, size + 1):
+        return False
+    add_unknown(motion, acts, after)
+    return True
+
+
+@lean_jit
+def add_unknown(motion, acts, after):
+    """Add to velocities what the impulses that were solved for give."""
+    size = unknown_impulses(motion, acts)
+    for a in range(motion.own):
+        column = 0
+        for j in range(motion.contacts.shape[0]):
+            if acts >> j & 1:
+                after[a] += push(motion, a, j) * motion.block[column, size]
+                column += 1
+        for k in range(motion.frictions.shape[0]):
+            if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
+                after[a] += motion.inverse[a, motion.frictions[k, FrictionColumn.COORDINATE]] * motion.block[column, size]
+                column += 1
+
+
+@lean_jit
+def worst_violation(motion, chosen, acts, after):
+    """By how much, as a speed, the solution in `block` violates the inequalities of an impact with friction; `tried` then has the
+    impulses of all contacts."""
+    worst, count, size, column = 0.0, motion.contacts.shape[0], unknown_impulses(motion, acts), 0
+    for i in range(count):
+        motion.tried[i] = motion.impulses[i]
+        if acts >> i & 1:
+            worst = max(worst, -motion.block[column, size] * abs(motion.coupling[i, i]))
+            motion.tried[i] += motion.block[column, size]
+            column += 1
+        elif chosen >> i & 1:
+            worst = max(worst, -motion.signs[i] * after[motion.contacts[i, ContactColumn.COORDINATE]] - motion.right[i])
+    for k in range(motion.frictions.shape[0]):
+        way, c = motion.frictions[k, FrictionColumn.STRUCK], motion.frictions[k, FrictionColumn.COORDINATE]
+        if way == FrictionImpact.STUCK:
+            most = rub_coefficient(motion, k) * motion.tried[motion.frictions[k, FrictionColumn.PRESSED] - 1]
+            worst = max(worst, (abs(motion.block[column, size]) - most) * motion.inverse[c, c])
+            column += 1
+        elif way != FrictionImpact.NOT:
+            worst = max(worst, -slip_sign(motion, k) * (after[c] - ground_speed(motion, k)))
+    return worst

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.flow.contacts.impacts import contact_position, gap_series
-from saltus.flow.contacts.layout import ContactColumn, SegmentEnd, SegmentExtremes, SegmentPlan
+from saltus.flow.contacts.impacts import gap_series
+from saltus.flow.contacts.layout import ContactColumn, SegmentEnd, SegmentExtremes, SegmentPlan, contact_position
 from saltus.flow.kernel.layout import EventCode
 from saltus.flow.kernel.roots import NOISE, horner, roots_within, scale_gap
 from saltus.taylor import lean_jit

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from saltus.flow.contacts.complementarity import eliminate
 from saltus.flow.contacts.impacts import record_contact_event
-from saltus.flow.contacts.layout import FrictionColumn, NoMargin
+from saltus.flow.contacts.layout import ContactColumn, FrictionColumn, NoMargin, ground_speed
 from saltus.flow.contacts.tangent import move_columns, note_shifts, slope
 from saltus.flow.kernel.layout import EXACT, ZERO, EventCode, Mode
 from saltus.flow.kernel.roots import NEVER, SIMPLE, contact_root, leading
@@ -35,7 +35,7 @@ def hold_frictions(motion):
     first = motion.parameters.size - motion.own
     for k in range(motion.frictions.shape[0]):
         slides = motion.frictions[k, FrictionColumn.SLIDES]
-        motion.parameters[first - motion.frictions.shape[0] + k] = 1.0 * slides
+        motion.parameters[first - motion.frictions.shape[0] + k] = 1.0 * slides if slides != 2 else 0.0
         if slides == 0:
             motion.parameters[first + motion.frictions[k, FrictionColumn.COORDINATE]] = 0.0
 
@@ -83,17 +83,12 @@ def leads_one_way(motion, t):
 
 @lean_jit
 def slide_bits(motion, count):
-    """The direction of each friction plus 1 (0, 1 or 2), in two bits each, behind the bits of `count` contacts."""
+    """The direction of each friction plus 1 (0, 1 or 2; 3 of an open contact), in two bits each, behind the bits of `count`
+    contacts."""
     bits = 0
     for k in range(motion.frictions.shape[0]):
         bits |= (1 + motion.frictions[k, FrictionColumn.SLIDES]) << (count + 2 * k)
     return bits
-
-
-@lean_jit
-def ground_speed(motion, k):
-    """The speed of a friction's ground."""
-    return motion.solver_numbers[motion.solver_numbers.size - motion.frictions.shape[0] + k]
 
 
 @lean_jit
@@ -113,7 +108,7 @@ def friction_step_size(motion, count, natural):
     tol = motion.tolerance
     sharp = min(tol, EXACT) if motion.mode == Mode.REST else tol
     for k in range(motion.frictions.shape[0]):
-        if motion.frictions[k, FrictionColumn.SLIDES] == 0:
+        if motion.frictions[k, FrictionColumn.SLIDES] == 0 and not leans(motion, k):
             r = motion.margin_series[count + 2 * k : count + 2 * k + 2]
             natural = min(natural, step_size(r, motion.order, max(1.0, abs(r[0, 0])), sharp))
     return natural
@@ -128,7 +123,7 @@ def first_friction(motion, count, h, whole):
     order, hit, first, which, shorter = motion.order, -1, NEVER, 2, False
     for k in range(motion.frictions.shape[0]):
         slides, skip = motion.frictions[k, FrictionColumn.SLIDES], motion.frictions[k, FrictionColumn.SKIP]
-        for b in range(2):
+        for b in range(0 if slides == 2 or leans(motion, k) else 2):
             known, guard = skip, motion.gap_series
             if slides == 0:
                 known, guard = (
@@ -200,11 +195,21 @@ def undecided(motion):
             continue
         place = motion.frictions[k, FrictionColumn.COORDINATE]
         rate = motion.velocities[place] - ground_speed(motion, k)
-        if rate == 0.0:
+        slides = motion.frictions[k, FrictionColumn.SLIDES]
+        if is_lifted(motion, k):
+            motion.frictions[k, FrictionColumn.SLIDES], motion.frictions[k, FrictionColumn.SKIP] = 2, 0
+        elif rate == 0.0:
             bits |= 1 << k
-        elif abs(rate) > ZERO or rate * motion.frictions[k, FrictionColumn.SLIDES] >= 0.0:
+        elif abs(rate) > ZERO or rate * slides >= 0.0 or slides == 2:
             motion.frictions[k, FrictionColumn.SLIDES], motion.frictions[k, FrictionColumn.SKIP] = 1 if rate > 0.0 else -1, 0
     return bits
+
+
+@lean_jit
+def is_lifted(motion, k):
+    """Whether a friction is in a contact that is open."""
+    pressed = motion.frictions[k, FrictionColumn.PRESSED]
+    return pressed > 0 and motion.contacts[pressed - 1, ContactColumn.CLOSED] == 0
 
 
 @lean_jit
@@ -213,10 +218,17 @@ def choose_slides(motion, candidates, choice):
     that is no candidate has a digit other than 0."""
     for k in range(motion.frictions.shape[0]):
         digit, choice = choice % 3, choice // 3
-        if candidates >> k & 1:
+        if is_lifted(motion, k):
+            motion.frictions[k, FrictionColumn.SLIDES] = 2
+            if digit > 0:
+                return False
+        elif candidates >> k & 1:
             motion.frictions[k, FrictionColumn.SLIDES] = digit if digit < 2 else -1
         elif digit > 0:
             return False
+        elif motion.frictions[k, FrictionColumn.SLIDES] == 2:
+            rate = motion.velocities[motion.frictions[k, FrictionColumn.COORDINATE]] - ground_speed(motion, k)
+            motion.frictions[k, FrictionColumn.SLIDES] = 1 if rate > 0.0 else -1 if rate < 0.0 else 0
     return True
 
 
@@ -230,6 +242,8 @@ def slides_so(motion, count, candidates):
             continue
         slides, reached = motion.frictions[k, FrictionColumn.SLIDES], motion.frictions[k, FrictionColumn.REACHED]
         motion.frictions[k, FrictionColumn.SKIP], motion.frictions[k, FrictionColumn.MARGIN] = 0, 0
+        if slides == 2 or leans(motion, k):
+            continue
         if slides == 0:
             for b in range(2):
                 row = motion.margin_series[count + 2 * k + b]
@@ -249,12 +263,12 @@ def slides_so(motion, count, candidates):
 
 @lean_jit
 def record_slides(motion, before, t):
-    """Record the frictions that have begun to stick or to slide, or have reversed, since the directions `before` (base-3
+    """Record the frictions that have begun to stick or to slide, or have reversed, since the directions `before` (base-4
     digits)."""
     for k in range(motion.frictions.shape[0]):
-        was, slides = before % 3 - 1, motion.frictions[k, FrictionColumn.SLIDES]
-        before //= 3
-        if slides != was:
+        was, slides = before % 4 - 1, motion.frictions[k, FrictionColumn.SLIDES]
+        before //= 4
+        if slides != was and slides != 2 and was != 2:
             kind = EventCode.SLIP if was == 0 else EventCode.STICK if slides == 0 else EventCode.REVERSAL
             if motion.frictions[k, FrictionColumn.MARGIN] == NoMargin.SURFACE:
                 kind = EventCode.CROSSING
@@ -264,10 +278,10 @@ def record_slides(motion, before, t):
 
 @lean_jit
 def slides_before(motion):
-    """The directions of all frictions plus 1, as the base-3 digits of a number."""
+    """The directions of all frictions plus 1, as the base-4 digits of a number."""
     number = 0
     for k in range(motion.frictions.shape[0] - 1, -1, -1):
-        number = 3 * number + 1 + motion.frictions[k, FrictionColumn.SLIDES]
+        number = 4 * number + 1 + motion.frictions[k, FrictionColumn.SLIDES]
     return number
 
 
@@ -277,29 +291,79 @@ def stick_columns(motion, count):
     slide, M dz = S p.
 
     When a friction begins to stick during the motion, no impulse is left. At the start of a motion, neighbouring motions slide
-    for a time of the order of their sliding speeds, in which nothing else changes to first order.
+    for a time of the order of their sliding speeds, in which nothing else changes to first order. Impulses of closed contacts
+    keep these closed.
     """
-    own, block = motion.own, motion.block
+    own, block, rows = motion.own, motion.block, motion.contacts.shape[0] + motion.frictions.shape[0]
     for j in range(motion.columns):
         size = 0
-        for k in range(motion.frictions.shape[0]):
-            if motion.frictions[k, FrictionColumn.SLIDES] == 0:
-                a, column = motion.frictions[k, FrictionColumn.COORDINATE], 0
-                for other in range(motion.frictions.shape[0]):
-                    if motion.frictions[other, FrictionColumn.SLIDES] == 0:
-                        block[size, column] = motion.inverse[a, motion.frictions[other, FrictionColumn.COORDINATE]]
+        for row in range(rows):
+            a = held_by(motion, row)
+            if a >= 0:
+                column = 0
+                for other in range(rows):
+                    b = held_by(motion, other)
+                    if b >= 0:
+                        block[size, column] = motion.inverse[a, b]
                         column += 1
-                moved = slope(motion, j, motion.solver_numbers.size - motion.frictions.shape[0] + k)
+                k = row - motion.contacts.shape[0]
+                moved = 0.0 if k < 0 else slope(motion, j, motion.solver_numbers.size - motion.frictions.shape[0] + k)
                 block[size, column] = moved - motion.velocities[own * (1 + j) + a]
                 size += 1
         eliminate(block, size, size + 1)
-        row = 0
-        for k in range(motion.frictions.shape[0]):
-            if motion.frictions[k, FrictionColumn.SLIDES] == 0:
+        found = 0
+        for row in range(rows):
+            b = held_by(motion, row)
+            if b >= 0:
                 for a in range(own):
-                    gain = motion.inverse[a, motion.frictions[k, FrictionColumn.COORDINATE]]
-                    motion.velocities[own * (1 + j) + a] += gain * block[row, size]
-                row += 1
+                    motion.velocities[own * (1 + j) + a] += motion.inverse[a, b] * block[found, size]
+                found += 1
+
+
+@lean_jit
+def held_by(motion, row):
+    """The coordinate that a contact or, behind the contacts, a friction holds; -1 for none, or one that its contact holds too."""
+    count = motion.contacts.shape[0]
+    if row < count:
+        return motion.contacts[row, ContactColumn.COORDINATE] if motion.contacts[row, ContactColumn.CLOSED] == 1 else -1
+    k = row - count
+    if motion.frictions[k, FrictionColumn.SLIDES] != 0 or leans(motion, k):
+        return -1
+    return motion.frictions[k, FrictionColumn.COORDINATE]
+
+
+@lean_jit
+def leans(motion, k):
+    """Whether a closed contact holds the coordinate along which a friction acts, so that the friction carries what it can."""
+    found = False
+    for i in range(motion.contacts.shape[0]):
+        found = found or (motion.contacts[i, ContactColumn.CLOSED] == 1 and is_along(motion, k, i))
+    return found
+
+
+@lean_jit
+def is_along(motion, k, i):
+    """Whether a friction, no surface, acts along the coordinate of a contact."""
+    along = motion.contacts[i, ContactColumn.COORDINATE] == motion.frictions[k, FrictionColumn.COORDINATE]
+    return along and motion.frictions[k, FrictionColumn.MARGIN] != NoMargin.SURFACE
+
+
+@lean_jit
+def rubs_along(motion, i):
+    """1 plus the number of a friction along the coordinate of a contact, 0 if there is none."""
+    for k in range(motion.frictions.shape[0]):
+        if is_along(motion, k, i):
+            return k + 1
+    return 0
+
+
+@lean_jit
+def tear_loose(motion, i):
+    """Note of frictions that hold a coordinate together with a contact, whose reaction has just fallen to 0, that they too carry
+    all that they can."""
+    for k in range(motion.frictions.shape[0]):
+        if motion.frictions[k, FrictionColumn.SLIDES] == 0 and is_along(motion, k, i):
+            motion.frictions[k, FrictionColumn.REACHED] = 2 if motion.signs[i] > 0.0 else 1
 
 
 @lean_jit

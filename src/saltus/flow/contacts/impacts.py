@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
-from saltus.flow.contacts.complementarity import acting, complementary, invert
-from saltus.flow.contacts.layout import FINISHED, MOST_FROZEN_IMPACTS, VANISHED, ContactColumn
+from saltus.flow.contacts.complementarity import acting, complementary, invert, push
+from saltus.flow.contacts.layout import FINISHED, MOST_FROZEN_IMPACTS, VANISHED, ContactColumn, contact_position, restitution
 from saltus.flow.kernel.layout import CHATTER_SPEED, EXACT, SLOW, Mode
 from saltus.flow.kernel.steps import column_step, leaps, step_size
 from saltus.taylor import lean_jit
@@ -62,20 +62,6 @@ def contact_step_size(motion, t, target, size):
     while motion.checked > 0 and leaps(motion, t, 1.0, min(natural, target - t), size):
         natural = 0.5 * min(natural, target - t)
     return natural
-
-
-@lean_jit
-def restitution(motion, i, j):
-    """The entry E_ij of the restitution matrix."""
-    own, count = motion.own, motion.contacts.shape[0]
-    return motion.solver_numbers[own * own + count * i + j]
-
-
-@lean_jit
-def contact_position(motion, i):
-    """The position of a contact."""
-    own, count = motion.own, motion.contacts.shape[0]
-    return motion.solver_numbers[own * own + count * count + i]
 
 
 @lean_jit
@@ -372,7 +358,9 @@ def bring_to_rest(motion, near):
         if near >> i & 1:
             motion.impulses[i] = motion.tried[row]
             row += 1
-    apply_impulses(motion)
+    for a in range(motion.own):
+        for j in range(count):
+            motion.velocities[a] += push(motion, a, j) * motion.impulses[j]
     for i in range(count):
         if near >> i & 1:
             settle_contact(motion, i, 0.0)
@@ -397,3 +385,11 @@ def only_open(contacts):
 def is_smooth(motion):
     """Whether a motion without friction is on a smooth arc, with no guards known to be 0 but those of `only_open`."""
     return motion.mode == Mode.ARC and motion.frictions.shape[0] == 0 and only_open(motion.contacts)
+
+
+@lean_jit
+def undecide(motion, opened):
+    """Close those contacts in `opened` again that are at rest: which of them stay closed is decided later."""
+    for i in range(motion.contacts.shape[0]):
+        if opened >> i & 1 and motion.velocities[motion.contacts[i, ContactColumn.COORDINATE]] == 0.0:
+            motion.contacts[i, ContactColumn.CLOSED] = 1

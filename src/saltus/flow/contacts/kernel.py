@@ -18,6 +18,7 @@ import math
 import numpy as np
 
 from saltus.flow.contacts.closings import block_of, choose_closed, contact_impact, note_ties, rests_in_a_row
+from saltus.flow.contacts.complementarity import is_pressed, slides_on
 from saltus.flow.contacts.frictions import (
     all_stand,
     begin_on_surfaces,
@@ -29,11 +30,11 @@ from saltus.flow.contacts.frictions import (
     slide_bits,
     slides_before,
     stick_columns,
+    tear_loose,
     undecided,
 )
 from saltus.flow.contacts.impacts import (
     closed_bits,
-    contact_position,
     contact_step_size,
     fill_after,
     fill_contact_matrices,
@@ -45,10 +46,21 @@ from saltus.flow.contacts.impacts import (
     slow_impacts,
     smaller_set,
 )
-from saltus.flow.contacts.layout import GAP_ROUNDING, MOST_TRIED, NEAR, TRIED_AGAIN, ContactColumn, FrictionColumn, solver_arrays
+from saltus.flow.contacts.layout import (
+    GAP_ROUNDING,
+    MOST_TRIED,
+    NEAR,
+    TRIED_AGAIN,
+    ContactColumn,
+    FrictionColumn,
+    contact_position,
+    solver_arrays,
+)
+from saltus.flow.contacts.rubbing import free_pulls, rubbed_accumulation, turns_with, unknown_shifts
 from saltus.flow.contacts.tangent import (
     accumulation_shifts,
     clear_shifts,
+    event_shifts,
     fill_slopes,
     move_columns,
     note_shifts,
@@ -62,22 +74,6 @@ from saltus.flow.kernel.steps import columns_at_event, expand, motion_end, move,
 from saltus.taylor import jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
-
-
-@lean_jit
-def free_pulls(motion, t):
-    """Fill the second derivatives of the gaps with all contacts open; returns 1 plus their largest relative rate of change."""
-    own, change = motion.own, 0.0
-    first = motion.parameters.size - own
-    for i in range(own):
-        motion.parameters[first + i] = 1.0
-    expand(motion, t, 1.0, 2)
-    for i in range(motion.contacts.shape[0]):
-        a = motion.acceleration_series[motion.contacts[i, ContactColumn.COORDINATE]]
-        motion.pulls[i] = motion.signs[i] * a[0]
-        if a[1] != 0.0:  # bodies that fall together do not press on one another, and go on so
-            change = max(change, abs(a[1] / a[0]) if a[0] != 0.0 else np.inf)
-    return 1.0 + change
 
 
 @lean_jit
@@ -96,22 +92,23 @@ def end_accumulation_of(motion, t):
         return t
     change = free_pulls(motion, t)
     near = near_contacts(motion, slow_impacts(tol))
-    if near == 0:
+    if near == 0 or not slides_on(motion, near):
         return t
     limit = min(np.sqrt(10.0 * tol / change), motion_end(motion) - t)
-    together, left, moving = near, frozen_accumulation(motion, near, -1, limit), 0
-    if left < 0.0:
+    together, turns, moving = near, turns_with(motion, last), 0
+    left = rubbed_accumulation(motion, t, near, last, limit) if turns else frozen_accumulation(motion, near, -1, limit)
+    if left < 0.0 and not turns:
         near = smaller_set(motion, near)
         again = frozen_accumulation(motion, near, -1, limit) if near != 0 else -1.0
         left = again if again >= 0.0 else left + again
-    if left < 0.0 and count > MOST_TRIED:  # other blocks, which do not act on this one, may be bouncing too
+    if left < 0.0 and not turns and count > MOST_TRIED:  # other blocks, which do not act on this one, may be bouncing too
         block = block_of(motion, 1 << last, False)
         if together & ~block:
             near = together & block
             again = frozen_accumulation(motion, near, block, limit)
             left = again if again >= 0.0 else left + again
     slow = slow_impacts(tol)
-    while left < 0.0 and slow >= slowest:  # on ever smaller scales, as of bodies that collapse beside others that still move
+    while left < 0.0 and slow >= slowest and not turns:  # on ever smaller scales, as of bodies beside others that still move
         slow *= 1e-3
         slower = near_contacts(motion, slow)
         if slower != near and slower != 0:
@@ -125,25 +122,14 @@ def end_accumulation_of(motion, t):
         return t
     record_contact_event(motion, EventCode.HELD, moving, t + left)
     if motion.columns > 0:
-        accumulation_shifts(motion, near, t)
+        if turns:
+            unknown_shifts(motion)
+        else:
+            accumulation_shifts(motion, near, t)
         note_shifts(motion, motion.event_shifts)
     rests_in_a_row(motion, t, near)
     fill_after(motion)
     return t + left
-
-
-@lean_jit
-def event_shifts(motion):
-    """Fill `EVENT_SHIFTS` with the shifts in the state, or with those recorded for an impact at this instant, which are nan if
-    contacts close at several instants in neighbouring motions."""
-    for i in range(motion.contacts.shape[0]):
-        if motion.contacts[i, ContactColumn.RELEASED] == 1:
-            return  # `release_columns` has filled them
-    first, last = 1 + 2 * motion.own + motion.contacts.shape[0], motion.recorded_events - 1
-    for j in range(motion.columns):
-        motion.event_shifts[j] = motion.shifts[j]
-        if last >= 0 and motion.event_labels[last, 1] == EventCode.IMPACT and motion.event_values[last, 0] == motion.time:
-            motion.event_shifts[j] = motion.event_values[last, first + j]
 
 
 @lean_jit
@@ -159,6 +145,8 @@ def decide_columns(motion, t):
         hold_coordinates(motion)
         hold_frictions(motion)
     if motion.frictions.shape[0] > 0:
+        if is_pressed(motion):
+            fill_contact_matrices(motion)
         fill_slopes(motion)
         stick_columns(motion, motion.contacts.shape[0])
     expand(motion, t, 1.0, 0)
@@ -351,6 +339,8 @@ def contact_arc(motion, target):
         if motion.columns > 0:
             release_columns(motion, motion.time, hit)
         motion.mode, motion.contacts[hit, ContactColumn.RELEASED] = Mode.CONTACT, 1 if first > 0.0 else 0
+        if first > 0.0:
+            tear_loose(motion, hit)
     if rubs >= 0:
         fill_slopes(motion)
         reach_ground_speed(motion, count, motion.time, rubs, which, first > 0.0)
@@ -397,5 +387,5 @@ def parts_of(numbers, state, env, functions, rows, buffers):
     """The memory of a motion but for its numbers as one named tuple; `rows` are those of contacts, then of frictions."""
     count, steps = functions.signs.size, step_arrays(numbers)
     contacts, frictions = rows[:count], rows[count:]
-    solver = solver_arrays(numbers.own, count, numbers.columns, frictions.shape[0], numbers.first_order)
+    solver = solver_arrays(numbers.own, count, numbers.columns, frictions, numbers.first_order)
     return ContactsParts(state, env, env[0], env[2], functions, contacts, frictions, steps, solver, buffers[0], buffers[1])

@@ -54,7 +54,7 @@ def begin_contact(lane, env, state):
         beyond, rate = state[coordinate], state[state.size // 2 + coordinate]
         if not surface:
             beyond = rate
-        beyond -= solved[own * own + count * count + count * (1 + sizes.first_order) + k]
+        beyond -= solved[solved.size - sizes.frictions + k]
         row[FrictionColumn.COORDINATE], row[FrictionColumn.SKIP] = coordinate, 0
         row[FrictionColumn.SLIDES] = 1 if beyond > 0.0 else -1 if beyond < 0.0 else 0
         row[FrictionColumn.MARGIN] = row[FrictionColumn.REACHED] = 0

@@ -25,10 +25,22 @@ class FrictionColumn(IntEnum):
     """Columns of the rows behind those of the contacts, one row for each friction, then one for each surface."""
 
     COORDINATE = 0  # the coordinate along which it acts
-    SLIDES = 1  # the direction in which it slides, +1 or -1; 0 if it sticks; of a surface the side, +1 above its position
+    SLIDES = 1  # the direction in which it slides, +1 or -1; 0 if it sticks; of a surface the side, +1 above its position; 2 of a
+    # friction in a contact that is open
     SKIP = 2  # how many of the first Taylor coefficients of its guard are known to be 0 at the start of a step
     MARGIN = 3  # if it sticks, the number of the margin that SKIP refers to; a `NoMargin` for a surface
     REACHED = 4  # 1 or 2: this margin has just reached 0; 3: the sliding speed has, or the surface is reached
+    PRESSED = 5  # 1 plus the number of the contact whose reaction presses it, 0 for none
+    STRUCK = 6  # a `FrictionImpact`
+
+
+class FrictionImpact(IntEnum):
+    """What a friction in a contact did at the last impact."""
+
+    NOT = 0  # the contact had no impulse
+    STUCK = 1  # after it the coordinate has the speed of the ground
+    FORWARDS = 2  # it slides forwards after it
+    BACKWARDS = 3
 
 
 class NoMargin(IntEnum):
@@ -112,13 +124,17 @@ def rows_of_zeros(rows, columns):
 
 @jit
 def solver_arrays(own, count, columns, frictions, first_order):
-    """The arrays in which impacts are solved for, for so many columns of a tangent."""
-    most, numbers = max(2 * own, count + 1), own * own + count * count + count * (1 + first_order) + frictions
+    """The arrays in which impacts are solved for, for so many columns of a tangent and with the rows of frictions."""
+    rubs, rows = 0, count + frictions.shape[0]
+    for k in range(frictions.shape[0]):
+        rubs = 1 + frictions.shape[0] if frictions[k, FrictionColumn.PRESSED] > 0 else rubs
+    most = max(2 * own, rows + 1)
+    numbers = own * own + count * count + count * (1 + first_order) + rubs + frictions.shape[0]
     return SolverArrays(
         zeros(numbers),
         rows_of_zeros(own, own),
         rows_of_zeros(count, count),
-        rows_of_zeros(max(own, count), most),
+        rows_of_zeros(max(own, rows), most),
         rows_of_zeros(count, count),
         zeros(count),
         zeros(count),
@@ -141,3 +157,35 @@ def copy_all(given, target):
     """Copy an array into another one; numba's assignment of slices would take seconds to compile."""
     for i in range(given.size):
         target[i] = given[i]
+
+
+@lean_jit
+def restitution(motion, i, j):
+    """The entry E_ij of the restitution matrix."""
+    own, count = motion.own, motion.contacts.shape[0]
+    return motion.solver_numbers[own * own + count * i + j]
+
+
+@lean_jit
+def contact_position(motion, i):
+    """The position of a contact."""
+    own, count = motion.own, motion.contacts.shape[0]
+    return motion.solver_numbers[own * own + count * count + i]
+
+
+@lean_jit
+def ground_speed(motion, k):
+    """The speed of a friction's ground."""
+    return motion.solver_numbers[motion.solver_numbers.size - motion.frictions.shape[0] + k]
+
+
+@lean_jit
+def has_phases(motion):
+    """Whether impacts with friction have a phase of compression and one of expansion."""
+    return motion.solver_numbers[motion.solver_numbers.size - 2 * motion.frictions.shape[0] - 1] > 0.0
+
+
+@lean_jit
+def rub_coefficient(motion, k):
+    """The coefficient of a friction in a contact, at impacts."""
+    return motion.solver_numbers[motion.solver_numbers.size - 2 * motion.frictions.shape[0] + k]

@@ -23,15 +23,13 @@ from saltus.flow.contacts.extremes import (
 )
 from saltus.flow.contacts.impacts import (
     apply_impulses,
-    contact_position,
     contact_step_size,
     fill_contact_matrices,
     hold_coordinates,
     impact_impulses,
     jump_first_order,
-    restitution,
 )
-from saltus.flow.contacts.layout import ContactColumn, SegmentEnd, SegmentPlan, solver_arrays
+from saltus.flow.contacts.layout import ContactColumn, SegmentEnd, SegmentPlan, contact_position, restitution, solver_arrays
 from saltus.flow.contacts.tangent import (
     fill_slopes,
     gap_derivative,
@@ -313,7 +311,7 @@ def follow_contact_segments(numbers, env, functions, contacts, request, results)
     """
     record, count = numbers[0], contacts.shape[0]
     state = state_arrays(record, np.zeros(2 * record.dof + record.columns))
-    solver = solver_arrays(record.own, count, record.columns, 0, record.first_order)
+    solver = solver_arrays(record.own, count, record.columns, contacts[:0], record.first_order)
     parts = ContactsSegmentParts(
         state, env, env[0], functions, contacts, step_arrays(record), solver, np.zeros(record.order + 2), np.zeros(2)
     )

@@ -15,9 +15,9 @@ import math
 
 import numpy as np
 
-from saltus.flow.contacts.complementarity import acting, invert
-from saltus.flow.contacts.impacts import frozen_accumulation, jump_place, restitution
-from saltus.flow.contacts.layout import APART, RELATIVE_STEP, TIED, ContactColumn, ImpactDetail, copy_all
+from saltus.flow.contacts.complementarity import acting, fill_rubbing, invert, is_pressed, push
+from saltus.flow.contacts.impacts import frozen_accumulation, jump_place
+from saltus.flow.contacts.layout import APART, RELATIVE_STEP, TIED, ContactColumn, ImpactDetail, copy_all, restitution
 from saltus.flow.kernel.layout import EventCode
 from saltus.flow.kernel.steps import columns_at_event, expand
 from saltus.taylor import jit, lean_jit
@@ -235,6 +235,8 @@ def perturb(motion, j, step):
         for k in range(count):
             entry = motion.inverse[motion.contacts[i, ContactColumn.COORDINATE], motion.contacts[k, ContactColumn.COORDINATE]]
             motion.coupling[i, k] = signs[i] * signs[k] * entry
+    if is_pressed(motion):
+        fill_rubbing(motion)
 
 
 @jit
@@ -271,27 +273,13 @@ def accumulation_shifts(motion, near, t):
 
 
 @lean_jit
-def rest_columns(motion, near):
-    """The columns at the end of an accumulation, where impulses on the contacts in `near` alone take their speeds."""
-    own = motion.own
-    for a in range(own):
-        motion.jump[a] = 0.0
-        for i in range(motion.contacts.shape[0]):
-            gain = motion.inverse[a, motion.contacts[i, ContactColumn.COORDINATE]] * motion.signs[i]
-            motion.jump[a] += gain * motion.impulses[i]
-    impulse_columns(motion, near, 0)
-    hold_columns(motion, near)
-
-
-@lean_jit
 def project(motion, closed, vector):
     """Add M^-1 S z to a vector, with the z for which the gaps in `closed` change by -`right`."""
-    own, count, signs = motion.own, motion.contacts.shape[0], motion.signs
+    own, count = motion.own, motion.contacts.shape[0]
     acting(motion.coupling, motion.right, count, closed, motion.block, motion.tried)
     for a in range(own):
         for i in range(count):
-            gain = motion.inverse[a, motion.contacts[i, ContactColumn.COORDINATE]] * signs[i]
-            vector[a] += gain * motion.tried[i]
+            vector[a] += push(motion, a, i) * motion.tried[i]
 
 
 @jit
@@ -341,6 +329,8 @@ def start_columns(motion, t, closed):
     """
     own, count = motion.own, motion.contacts.shape[0]
     fill_slopes(motion)
+    if is_pressed(motion):
+        fill_rubbing(motion)
     for j in range(motion.columns):
         lifted, lossless = 0.0, False
         for i in range(count):
@@ -358,3 +348,17 @@ def start_columns(motion, t, closed):
             continue
         fall_back(motion, t, closed, j)
     hold_columns(motion, closed)
+
+
+@lean_jit
+def event_shifts(motion):
+    """Fill `EVENT_SHIFTS` with the shifts in the state, or with those recorded for an impact at this instant, which are nan if
+    contacts close at several instants in neighbouring motions."""
+    for i in range(motion.contacts.shape[0]):
+        if motion.contacts[i, ContactColumn.RELEASED] == 1:
+            return  # `release_columns` has filled them
+    first, last = 1 + 2 * motion.own + motion.contacts.shape[0], motion.recorded_events - 1
+    for j in range(motion.columns):
+        motion.event_shifts[j] = motion.shifts[j]
+        if last >= 0 and motion.event_labels[last, 1] == EventCode.IMPACT and motion.event_values[last, 0] == motion.time:
+            motion.event_shifts[j] = motion.event_values[last, first + j]

@@ -13,7 +13,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from saltus.checks import check_names
-from saltus.flow.contacts import closings, complementarity, frictions, tangent
+from saltus.flow.contacts import closings, complementarity, frictions, rubbing, tangent
 from saltus.flow.contacts import impacts as contact_impacts
 from saltus.flow.contacts import kernel as contacts_kernel
 from saltus.flow.contacts import layout as contact_layout
@@ -159,14 +159,7 @@ def contacts_module() -> ModuleType:
 
 def contacts_text() -> str:
     """The source of the kernel of models with several contacts."""
-    parts = (
-        contact_layout,
-        complementarity,
-        contact_impacts,
-        tangent,
-        frictions,
-        closings,
-    )
+    parts = (contact_layout, complementarity, contact_impacts, tangent, rubbing, frictions, closings)
     text = kernel_text(layout, roots, steps, *parts, contacts_kernel, loop)
     return text.replace("(ADVANCE)", "(ADVANCE_CONTACTS)")
 
@@ -391,7 +384,7 @@ _structures: dict[Any, tuple[Trace, CompiledStructure]] = {}
 def limits_of(system: System, stop_at: Iterable[str]) -> tuple[str, ...]:
     """The margins that end a motion: the model's own stops and those asked for."""
     model, asked = system.model, check_names("stop_at", stop_at, "margins, such as ['kinematic_limit']")
-    own = system._remembered("limits", lambda: (*model.stops, *(friction.limit for friction in model.frictions)))
+    own = system._remembered("limits", lambda: (*model.stops, *model.friction_limits))
     return tuple(dict.fromkeys((*own, *asked)))
 
 

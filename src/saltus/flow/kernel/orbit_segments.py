@@ -12,7 +12,7 @@ from saltus.flow.contacts import complementarity, extremes, tangent
 from saltus.flow.contacts import impacts as contact_impacts
 from saltus.flow.contacts import layout as contact_layout
 from saltus.flow.contacts import segments as contact_segments
-from saltus.flow.contacts.layout import ContactColumn, SegmentEnd, SegmentExtremes
+from saltus.flow.contacts.layout import ContactColumn, FrictionColumn, SegmentEnd, SegmentExtremes
 from saltus.flow.kernel import layout, roots, steps
 from saltus.flow.kernel.compiled import Program, kernel_text, taylor_order
 from saltus.flow.kernel.layout import SegmentColumn, SegmentValue
@@ -65,7 +65,7 @@ class SegmentFollower:
     ) -> ContactsSegmentResults | None:
         """The same for a model with several contacts and the segments of a `ContactsSegmentRequest`."""
         held, n, own = self._run.trace.contact_coordinates, len(request[0]), self.own
-        contacts = np.zeros((len(held), len(ContactColumn)), dtype=np.int64)
+        contacts = np.zeros((len(held), len(FrictionColumn)), dtype=np.int64)
         contacts[:, ContactColumn.COORDINATE] = held
         ends, columns = np.zeros((n, SegmentEnd.NUMBERS + 10 * own)), np.zeros((n, 2 * own + 1, self._columns))
         maps = np.zeros((n, 2 * own, self._columns))

@@ -29,7 +29,7 @@ def capture_speeds(
     """
     from saltus.bounds import keeps_rest
 
-    lifted = [friction.limit for friction in system.model.frictions]
+    lifted = system.model.friction_limits
     asked = [name for name in limits if name not in (*system.model.stops, *lifted)]
     if asked:
         raise ParameterError(f'until="rest" proves nothing about {asked[0]}; leave out either it or stop_at', "until")

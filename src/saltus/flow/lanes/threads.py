@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow.contacts.layout import ContactColumn, solver_arrays
+from saltus.flow.contacts.layout import FrictionColumn, solver_arrays
 from saltus.flow.kernel.compiled import Program, taylor_order
 from saltus.flow.kernel.layout import CHATTER_SPEED, ROUGHER, SERIES_LENGTH, SHORTEST, SLOW
 from saltus.flow.kernel.memory import MOTION
@@ -232,9 +232,7 @@ class Lanes:
     def _group(self, control: np.ndarray) -> LaneGroup:
         """A group of lanes for one thread, still without work; `control` = [whether to stop, forcing periods done so far]."""
         trace, own, plan = self.program.trace, self.own, self.plan
-        contacts, frictions = len(trace.signs), len(trace.friction_coordinates)
-        jumps = contacts * trace.first_order
-        numbers = own * own + contacts * contacts + contacts + jumps + frictions if self.several else 3
+        numbers = len(trace.contact_numbers) if self.several else 3
         nothing = np.zeros((0, 0))
         return LaneGroup(
             memory=self._memory(),
@@ -250,7 +248,7 @@ class Lanes:
             geometry=np.zeros((WIDTH, numbers)),
             stroboscopic=np.zeros((WIDTH, 2 * LONGEST_RECURRENCE, 2 * own)),
             agreements=np.zeros((WIDTH, LONGEST_RECURRENCE + 1), dtype=np.int64),
-            contact_rows=np.zeros((WIDTH, contacts + frictions, ContactColumn.WAITS + 1), dtype=np.int64),
+            contact_rows=np.tile(self._contact_rows(), (WIDTH, 1, 1)),
             polynomial=np.zeros(SERIES_LENGTH + 2),
             gap=np.zeros(SERIES_LENGTH + 2),
             impact_space=self._impact_space() if self.several else None,
@@ -259,15 +257,17 @@ class Lanes:
 
     def _impact_space(self) -> tuple[Any, ...]:
         """Room for an impact in a model with several contacts."""
-        trace, own = self.program.trace, self.own
-        contacts = len(trace.signs)
-        rows = np.zeros((contacts, ContactColumn.WAITS + 1), dtype=np.int64)
-        return (
-            np.zeros(1, dtype=MOTION),
-            np.zeros(2 * own),
-            rows,
-            solver_arrays(own, contacts, 0, len(trace.friction_coordinates), trace.first_order),
-        )
+        own, count, rows = self.own, len(self.program.trace.signs), self._contact_rows()
+        solver = solver_arrays(own, count, 0, rows[count:], self.program.trace.first_order)
+        return np.zeros(1, dtype=MOTION), np.zeros(2 * own), rows[:count], solver
+
+    def _contact_rows(self) -> np.ndarray:
+        """The scalar kernel's rows of contacts and frictions, before a motion has begun."""
+        trace = self.program.trace
+        contacts, frictions = len(trace.signs), len(trace.friction_coordinates)
+        rows = np.zeros((contacts + frictions, len(FrictionColumn)), dtype=np.int64)
+        rows[contacts:, FrictionColumn.PRESSED] = np.add(trace.friction_contacts or [-1] * frictions, 1)
+        return rows
 
     def _sizes(self) -> LaneSizes:
         """The numbers of the structure, and of what is asked for."""

@@ -239,7 +239,8 @@ def masks_of(names: Sequence[str]) -> dict[str, Any]:
 
 
 def modes_of(model: Model, side: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Closed contacts as bits, and the direction in which each friction slides, from the numbers `side` of motions."""
+    """Closed contacts as bits, and the direction in which each friction slides, from the numbers `side` of motions: +1 or -1, 0
+    where it sticks, 2 where its contact is open."""
     count, number = len(model.contacts), np.asarray(side).astype(np.int64) - 1
     slides = [(number >> (count + 2 * k) & 3) - 1 for k in range(len(model.frictions))]
     return number & np.int64((1 << count) - 1 if count < 64 else -1), slides

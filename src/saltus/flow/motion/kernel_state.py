@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from saltus.systems import System
 
 
-NO_ROWS = np.zeros((0, len(ContactColumn)), dtype=np.int64)
+NO_ROWS = np.zeros((0, len(FrictionColumn)), dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,6 +154,8 @@ class ContactState(KernelState):
         own_contacts, own_frictions, surfaces = _parts(request.system)
         held, rubbed = run.trace.contact_coordinates, run.trace.friction_coordinates
         contacts = np.zeros((len(held) + len(rubbed), NO_ROWS.shape[1]), dtype=np.int64)
+        if run.trace.friction_contacts:
+            contacts[len(held) :, FrictionColumn.PRESSED] = np.add(run.trace.friction_contacts, 1)
         contacts[:, ContactColumn.COORDINATE] = held + tuple(max(place, -1 - place) for place in rubbed)
         for row, contact in zip(contacts[: len(held)], own_contacts, strict=True):
             place = names.index(contact.coordinate)

@@ -12,7 +12,7 @@ from saltus.checks import Numbers, check_count, instants
 from saltus.errors import ParameterError, near
 from saltus.flow.motion.events import EventKind, Impacts, MotionEvents, Stop, masks_of, modes_of, sides_of, type_of_bits
 from saltus.flow.motion.validity import DenseOutput, Validity, ValidityCheck
-from saltus.notebook import html_table
+from saltus.progress import html_table
 from saltus.result import Result, provenance, table_of
 from saltus.systems import System
 
@@ -378,6 +378,7 @@ def _add_contacts(motion: Motion, dataset: xarray.Dataset, side: np.ndarray) -> 
     closed, slides = modes_of(model, side)
     for friction, direction in zip(model.frictions, slides, strict=True):
         text = f"direction in which {friction.name} slides, 0 where it sticks"
+        text += ", 2 where its contact is open" * (friction.contact is not None)
         dataset[f"sliding_{friction.name}"] = ("time", direction.astype(np.int8), {"units": "1", "long_name": text})
     for surface, beside in zip(model.surfaces, sides_of(model, side), strict=True):
         text = f"side of the surface {surface.name}"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from saltus.flow.kernel.layout import LOSSLESS
-from saltus.notebook import html_table, rows_table
+from saltus.progress import html_table, rows_table
 from saltus.systems import System, energy_gain
 
 STEP_SAMPLES = 12  # samples in each step to find changes of sign; a step is shorter than the time scale of a margin

@@ -12,13 +12,13 @@ import numpy as np
 from saltus.checks import answered, check_dataset, check_number
 from saltus.continuation import NEWTON, Course, End
 from saltus.errors import ParameterError
-from saltus.notebook import html_table
 from saltus.orbits.branches.orbit_curve import OrbitPoint
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialPoint, SpecialPoints
 from saltus.orbits.equations.contract import OrbitEquations
 from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import ModeChange, Signature
+from saltus.progress import html_table
 from saltus.result import Result, check_provenance, provenance
 from saltus.systems import System
 

@@ -145,7 +145,7 @@ class ContactModes(SideModes):
         for is_closed, image in zip(closed, images[:count], strict=True):
             found += int(is_closed) << image
         for direction, image in zip(slides, images[count:], strict=True):
-            found += (1 - int(direction)) << (count + 2 * (image - count))
+            found += (3 if direction == 2 else 1 - int(direction)) << (count + 2 * (image - count))
         return sum(1 << image for i, image in enumerate(images) if parts >> i & 1), found
 
     def groups(self, position: Any) -> tuple[Group, ...]:
@@ -197,11 +197,15 @@ class ContactModes(SideModes):
 
     def slidings(self, side: np.ndarray) -> list[tuple[int, float, np.ndarray]]:
         names, pairs = self.system.model.coordinates, zip(self.system.contact_model.frictions, self.slides(side), strict=True)
-        return [(names.index(f.coordinate), float(f.ground_speed), direction) for f, direction in pairs]
+        return [(names.index(f.coordinate), float(f.ground_speed), np.where(s == 2, 0, s)) for f, s in pairs]
 
     def holding(self, side: np.ndarray) -> list[tuple[list[np.ndarray], Callable[..., list[Any]]]]:
-        sticks = [direction == 0 for direction in self.slides(side) for _ in range(2)]
-        return [(self.closed(side), reactions), (sticks, stick_margins)]
+        known, closed = self.system.contact_model, self.closed(side)
+        sticks = list[np.ndarray]()
+        for friction, direction in zip(known.frictions, self.slides(side), strict=True):
+            leans = [own for c, own in zip(known.contacts, closed, strict=True) if c.coordinate == friction.coordinate]
+            sticks += [(direction == 0) & ~np.any([*leans, np.zeros_like(direction, dtype=bool)], axis=0)] * 2
+        return [(closed, reactions), (sticks, stick_margins)]
 
 
 def modes_in(system: System) -> SideModes:

@@ -1,0 +1,280 @@
+"""Impacts with friction, in one or two phases, and their derivatives; the accelerations that accumulations follow from.
+
+Its compiled part goes into one module with that of `kernel.py`; the words of `motion` are those of `flow/kernel/memory.py`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from saltus.flow.contacts.complementarity import (
+    add_unknown,
+    choose_ways,
+    eliminate,
+    fill_sticking,
+    invert,
+    is_pressed,
+    push,
+    rub_of,
+    slip_sign,
+    struck_velocities,
+    unknown_impulses,
+    worst_violation,
+)
+from saltus.flow.contacts.frictions import rubs_along
+from saltus.flow.contacts.layout import (
+    VIOLATED,
+    ContactColumn,
+    FrictionColumn,
+    FrictionImpact,
+    ground_speed,
+    has_phases,
+    restitution,
+    rub_coefficient,
+    zeros,
+)
+from saltus.flow.contacts.tangent import fill_slopes, hold_columns, impulse_columns, lift_rate, note_velocities, slope
+from saltus.flow.kernel.steps import expand
+from saltus.taylor import jit, lean_jit
+
+# --- compiled from here on -----------------------------------------------------------------------------------------------
+
+
+@jit
+def rubbing_phase(motion, chosen, scale):
+    """Solve an impact with friction, or one of its phases: with N = `impulses` + z of the contacts in `chosen`, and the
+    impulses P of frictions,
+
+        v+ = v- + M^-1 (S N + T P),    0 <= z _|_ S' v+ + `right` >= 0,    P = -mu N s with s = sign(T' v+ - w), or T' v+ = w and
+        abs(P) <= mu N.
+
+    All choices are tried, as in `complementary`, with speeds of the size `scale`. The velocities and `impulses` are set to those
+    after it, and `STRUCK` of the frictions. Returns the contacts with z > 0 as bits, or -1 if there is no solution.
+    """
+    own, count, frictions = motion.own, motion.contacts.shape[0], motion.frictions.shape[0]
+    after, found, ways, least = np.zeros(own), -1, 0, np.inf
+    for number in range((1 << count) * 3**frictions):
+        acts = number & ((1 << count) - 1)
+        if acts & ~chosen or not choose_ways(motion, chosen, acts, number >> count):
+            continue
+        if struck_velocities(motion, acts, after):
+            worst = worst_violation(motion, chosen, acts, after)
+            if worst < least:
+                found, ways, least = acts, number >> count, worst
+            if worst <= 0.0:
+                break
+    if not least <= VIOLATED * scale:
+        return -1
+    choose_ways(motion, chosen, found, ways)
+    struck_velocities(motion, found, after)
+    worst_violation(motion, chosen, found, after)
+    for a in range(own):
+        motion.velocities[a] = after[a]
+    for i in range(count):
+        motion.impulses[i] = max(motion.tried[i], 0.0)
+        if found >> i & 1:
+            motion.velocities[motion.contacts[i, ContactColumn.COORDINATE]] = -motion.signs[i] * motion.right[i] + 0.0
+    for k in range(frictions):
+        if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
+            motion.velocities[motion.frictions[k, FrictionColumn.COORDINATE]] = ground_speed(motion, k)
+    return found
+
+
+@lean_jit
+def begin_rubbing(motion, chosen):
+    """Fill `right` by the restitution and clear the impulses; returns the size of the speeds at an impact."""
+    scale, count = 0.0, motion.contacts.shape[0]
+    for i in range(count):
+        motion.impulses[i] = motion.right[i] = 0.0
+        scale = max(scale, abs(motion.rates[i]) if chosen >> i & 1 else 0.0)
+        for j in range(count):
+            motion.right[i] += restitution(motion, i, j) * motion.rates[j] if chosen >> j & 1 else 0.0
+    for k in range(motion.frictions.shape[0]):
+        scale = max(scale, abs(motion.velocities[motion.frictions[k, FrictionColumn.COORDINATE]] - ground_speed(motion, k)))
+    return scale
+
+
+@lean_jit
+def has_one_impulse(motion, chosen):
+    """Whether the impulses of frictions in the contacts in `chosen` are certainly the only ones: G_nn > mu abs(G_nt) of each."""
+    for k in range(motion.frictions.shape[0]):
+        i = motion.frictions[k, FrictionColumn.PRESSED] - 1
+        if i >= 0 and chosen >> i & 1:
+            a, c = motion.contacts[i, ContactColumn.COORDINATE], motion.frictions[k, FrictionColumn.COORDINATE]
+            if not motion.inverse[a, a] > rub_coefficient(motion, k) * abs(motion.inverse[a, c]):
+                return False
+    return True
+
+
+@jit
+def rubbing_impact(motion, chosen, slopes):
+    """Apply the impact law with friction to the contacts in `chosen`, whose rates before it are in `rates`, which then has those
+    after it; the velocities are changed, and the columns if they have `slopes`. Returns the contacts that act as bits, or -1 if
+    there is no solution, or not only one.
+
+    With phases the first one ends with rates of 0, and the second one has the impulses e times those of the first, and more where
+    a contact would close again.
+    """
+    count, total, own_slopes = motion.contacts.shape[0], np.zeros(motion.contacts.shape[0]), motion.pull_slopes
+    scale = begin_rubbing(motion, chosen)
+    acts, phases = -1, has_phases(motion)
+    if not has_one_impulse(motion, chosen):
+        return -1
+    for j in range(motion.columns):
+        for i in range(count):
+            own_slopes[j, i] = 0.0
+    for _ in range(2 if phases else 1):
+        for i in range(count if phases else 0):
+            motion.right[i] = 0.0
+            total[i] += motion.impulses[i]
+            motion.impulses[i] *= restitution(motion, i, i)
+        acts = rubbing_phase(motion, chosen, scale)
+        if acts < 0:
+            return -1
+        if motion.columns > 0 and slopes:
+            note_velocities(motion, -1.0)
+            rubbing_columns(motion, acts, 0 if phases else chosen, total)
+            note_velocities(motion, 0.0)
+    for i in range(count):
+        motion.impulses[i] += total[i]
+        rate = motion.signs[i] * motion.velocities[motion.contacts[i, ContactColumn.COORDINATE]]
+        motion.rates[i] = -motion.right[i] + 0.0 if acts >> i & 1 else max(rate, 0.0) if chosen >> i & 1 else rate
+    return acts
+
+
+@jit
+def rubbing_columns(motion, acts, chosen, first):
+    """Differentiate an impact with friction, with the directions in which frictions slide after it and those that stick.
+
+    As `impulse_columns`, with M w = S N + T P: P = -mu s N of frictions that slide, and T' v+ = w of those that stick. N are
+    `impulses`, of which e times `first`, those of an earlier phase, do not follow from the rates. `PULL_SLOPES` has the slopes of
+    these, and then those of N.
+    """
+    own, count, given, lifts = motion.own, motion.contacts.shape[0], np.zeros(motion.own), np.zeros(motion.contacts.shape[0])
+    fill_slopes(motion)
+    for j in range(motion.columns):
+        z = motion.velocities[own * (1 + j) : own * (2 + j)]
+        for i in range(count):
+            lifts[i] = lift_rate(motion, j, i)
+            motion.pull_slopes[j, i] *= restitution(motion, i, i)
+            motion.pull_slopes[j, i] += slope(motion, j, own * own + (count + 1) * i) * first[i]
+        for a in range(own):  # without the changes of the impulses
+            given[a] = z[a]
+            for b in range(own):
+                for c in range(own):
+                    given[a] -= motion.inverse[a, b] * slope(motion, j, own * b + c) * motion.jump[c]
+            for i in range(count):
+                given[a] += push_slope(motion, j, a, i) * motion.impulses[i] + push(motion, a, i) * motion.pull_slopes[j, i]
+        row, size = 0, unknown_impulses(motion, acts)
+        for i in range(count):
+            if acts >> i & 1:
+                a, change = motion.contacts[i, ContactColumn.COORDINATE], 0.0
+                for k in range(count):
+                    if chosen >> k & 1:
+                        change += restitution(motion, i, k) * lifts[k]
+                        change += slope(motion, j, own * own + count * i + k) * motion.gaps[k]
+                fill_sticking(motion, row, a, acts, -motion.signs[i] * change - given[a])
+                row += 1
+        for k in range(motion.frictions.shape[0]):
+            if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
+                a, place = (
+                    motion.frictions[k, FrictionColumn.COORDINATE],
+                    motion.solver_numbers.size - motion.frictions.shape[0] + k,
+                )
+                fill_sticking(motion, row, a, acts, slope(motion, j, place) - given[a])
+                row += 1
+        eliminate(motion.block, size, size + 1)
+        add_unknown(motion, acts, given)
+        row = 0
+        for i in range(count):
+            if acts >> i & 1:
+                motion.pull_slopes[j, i] += motion.block[row, size]
+                row += 1
+        for a in range(own):
+            z[a] = given[a]
+
+
+@lean_jit
+def push_slope(motion, j, a, i):
+    """The derivative of `push` to the coefficient of friction alone, along column j."""
+    k = rub_of(motion, i)
+    if k < 0:
+        return 0.0
+    moved = slope(motion, j, motion.solver_numbers.size - 2 * motion.frictions.shape[0] + k)
+    return -slip_sign(motion, k) * moved * motion.inverse[a, motion.frictions[k, FrictionColumn.COORDINATE]]
+
+
+@lean_jit
+def rest_columns(motion, near):
+    """The columns at the end of an accumulation, where impulses on the contacts in `near` alone take their speeds."""
+    own = motion.own
+    for a in range(own):
+        motion.jump[a] = 0.0
+        for i in range(motion.contacts.shape[0]):
+            motion.jump[a] += push(motion, a, i) * motion.impulses[i]
+    if is_pressed(motion):
+        invert(motion.solver_numbers, own, motion.block, motion.inverse)
+        for j in range(motion.columns):
+            for i in range(motion.contacts.shape[0]):
+                motion.pull_slopes[j, i] = 0.0
+        rubbing_columns(motion, near, 0, zeros(motion.contacts.shape[0]))
+    else:
+        impulse_columns(motion, near, 0)
+    hold_columns(motion, near)
+
+
+@lean_jit
+def free_pulls(motion, t):
+    """Fill the second derivatives of the gaps with all contacts open; returns 1 plus their largest relative rate of change."""
+    own, change = motion.own, 0.0
+    first = motion.parameters.size - own
+    for i in range(own):
+        motion.parameters[first + i] = 1.0
+    expand(motion, t, 1.0, 2)
+    for i in range(motion.contacts.shape[0]):
+        a = motion.acceleration_series[motion.contacts[i, ContactColumn.COORDINATE]]
+        motion.pulls[i] = motion.signs[i] * a[0]
+        if a[1] != 0.0:  # bodies that fall together do not press on one another, and go on so
+            change = max(change, abs(a[1] / a[0]) if a[0] != 0.0 else np.inf)
+    return 1.0 + change
+
+
+@lean_jit
+def turns_with(motion, i):
+    """1 plus the number of a friction on ground at rest along the coordinate of a contact, that turns with its bounces; or 0."""
+    rubs = rubs_along(motion, i)
+    return rubs if rubs and ground_speed(motion, rubs - 1) == 0.0 else 0
+
+
+@lean_jit
+def rubbed_accumulation(motion, t, near, i, limit):
+    """The time in which a contact loses its speed by impacts if a friction along its coordinate turns at the top of each flight,
+    with constant accelerations b before it and c after it:
+
+        (u / b + u / sqrt(b c)) / (1 - e sqrt(c / b))    for a speed u.
+
+    -1 if it does not lose it within `limit`, or others in `near` take part.
+    """
+    u, k = motion.rates[i], rubs_along(motion, i) - 1
+    coordinate, place = motion.contacts[i, ContactColumn.COORDINATE], motion.parameters.size - motion.own
+    place += k - motion.frictions.shape[0]
+    motion.parameters[place] = motion.signs[i]
+    expand(motion, t, 1.0, 0)
+    rising = -motion.signs[i] * motion.acceleration_series[coordinate, 0]
+    motion.parameters[place] = -motion.signs[i]
+    expand(motion, t, 1.0, 0)
+    falling = -motion.signs[i] * motion.acceleration_series[coordinate, 0]
+    if not (rising > 0.0 and falling > 0.0 and motion.gaps[i] == 0.0 and near == 1 << i):
+        return -1.0
+    left = 1.0 - restitution(motion, i, i) * math.sqrt(falling / rising)
+    found = (u / rising + u / math.sqrt(rising * falling)) / left if left > 0.0 else np.inf
+    return found if found <= limit else -1.0
+
+
+@lean_jit
+def unknown_shifts(motion):
+    """Set the shifts of an event to nan."""
+    for j in range(motion.columns):
+        motion.event_shifts[j] = math.nan
