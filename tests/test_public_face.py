@@ -224,8 +224,6 @@ def good(made):
         "Contact": (saltus.Contact, contact),
         "EnergyRestitution": (saltus.EnergyRestitution, {"r": 0.9}),
         "Structure": (saltus.Structure, {"mass": [[2.0]], "stiffness": [[1.0]], "forces": {"drive": 0}}),
-        "Structure.displacements": (saltus.Structure(mass=[[2.0]], stiffness=[[1.0]]).displacements, {"of": [1.0]}),
-        "Structure.start": (saltus.Structure(mass=[[2.0]], stiffness=[[1.0]]).start, {"displacement": 1.0}),
         "Surface": (saltus.Surface, {"name": "stop", "coordinate": "x"}),
         "Surface.side": (saltus.Surface(name="stop", coordinate="x").side, {"position": 0.5}),
         "Friction": (saltus.Friction, {"name": "belt", "coordinate": "x", "kinetic": 0.2}),
