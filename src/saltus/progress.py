@@ -83,7 +83,7 @@ def show_progress(fraction: float, what: str) -> None:
     print(f"\r[{bar:<20}] {100 * fraction:3.0f} % {what:<40.40}", end="\n" if done else "", file=sys.stderr, flush=True)
 
 
-class RememberedFraction:
+class FractionMemory:
     """A progress that remembers the fraction, for parts of the work that know nothing of the whole."""
 
     def __init__(self, progress: Progress) -> None:
@@ -94,13 +94,13 @@ class RememberedFraction:
         return self.progress(fraction, what)
 
 
-_watch: ContextVar[RememberedFraction | None] = ContextVar("watch", default=None)
+_watch: ContextVar[FractionMemory | None] = ContextVar("watch", default=None)
 
 
 @contextmanager
-def watched(progress: Progress) -> Iterator[RememberedFraction]:
+def watched(progress: Progress) -> Iterator[FractionMemory]:
     """While work goes on, `say` tells this progress; work is given the one that is returned in its place."""
-    watch = RememberedFraction(progress)
+    watch = FractionMemory(progress)
     token = _watch.set(watch)
     try:
         yield watch

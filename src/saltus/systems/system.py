@@ -314,7 +314,7 @@ class System:
         return cls.from_dict(_parsed(text, tomllib.loads, "TOML"))
 
 
-class _Passed(NamedTuple):
+class _CheckedParts(NamedTuple):
     """A model and an impact law that have passed their checks, and whether the model has contacts of sums of coordinates."""
 
     model: Any = None
@@ -322,7 +322,7 @@ class _Passed(NamedTuple):
     has_sums: bool = False
 
 
-_passed = _Passed()  # the last ones: `with_` makes systems by the thousand whose loads alone differ
+_passed = _CheckedParts()  # the last ones: `with_` makes systems by the thousand whose loads alone differ
 
 
 def _passes(model: Model, impact: ImpactLaw) -> bool:
@@ -332,7 +332,7 @@ def _passes(model: Model, impact: ImpactLaw) -> bool:
     if last.model is not model or last.impact is not impact or not is_fixed(model):
         has_sums = check_works(model)
         _check_impact(model, impact)
-        _passed = last = _Passed(model, impact, has_sums)
+        _passed = last = _CheckedParts(model, impact, has_sums)
     return last.has_sums
 
 
