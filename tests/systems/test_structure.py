@@ -171,3 +171,46 @@ def test_what_is_no_structure_is_refused(sentence: str) -> None:
     with pytest.raises(saltus.ParameterError) as error:
         saltus.Structure(**{**GOOD, **REFUSED[sentence]})
     assert sentence in str(error.value)
+
+
+@pytest.mark.parametrize("size", [1, 2, 40])
+def test_free_flight_is_the_exponential_of_the_matrices(size: int) -> None:
+    """With a damping that couples the modes, without contacts that are reached."""
+    from scipy.linalg import expm
+
+    rng = np.random.default_rng(size)
+    mass, stiffness, damping = (x @ x.T / size + np.eye(size) for x in rng.normal(size=(3, size, size)))
+    far = saltus.Contact(name="far", coordinate=0, position=-100.0)
+    structure = saltus.Structure(mass=mass, stiffness=stiffness, damping=0.1 * damping, contacts=[far])
+    u, v = rng.normal(size=(2, size))
+    end = saltus.simulate(saltus.System(model=structure), **structure.start(u, v), duration=3.0)
+    inverse, zero = np.linalg.inv(mass), np.zeros((size, size))
+    flow = expm(3.0 * np.block([[zero, np.eye(size)], [-inverse @ stiffness, -0.1 * inverse @ damping]]))
+    found = np.append(structure.displacements(np.atleast_1d(end.position)), structure.displacements(np.atleast_1d(end.velocity)))
+    assert np.abs(found - flow @ np.append(u, v)).max() < 1e-11
+
+
+def test_a_study_names_the_file_of_the_matrices_beside_it(tmp_path) -> None:
+    np.savez(tmp_path / "chain.npz", **chain(3))
+    text = """
+    [model]
+    type = "Structure"
+    file = "chain.npz"
+    forces = { drive = 0 }
+    contacts = [{ name = "stop", coordinate = 2, position = 0.3, sign = -1 }]
+    [load]
+    frequency = 0.6
+    drive = { amplitude = 0.1 }
+    """
+    (tmp_path / "study.toml").write_text(text)
+    system = saltus.load_study(tmp_path / "study.toml").system
+    assert system.model == saltus.Structure(**chain(3), contacts=[STOP], forces={"drive": 0})
+
+
+def test_the_energies_of_contact_friction_and_soft_stop_close() -> None:
+    belt = saltus.Friction(name="belt", coordinate=1, kinetic=0.05, static=0.08, ground_speed=0.1)
+    structure = saltus.Structure(**chain(4), contacts=[STOP], surfaces=[SOFT], friction=[belt], forces={"drive": 3})
+    system = saltus.System(model=structure, load=LOAD, impact=saltus.NewtonImpact(e=0.5))
+    motion = saltus.simulate(system, **structure.start(), periods=10)
+    assert len(motion.events) > 20
+    assert abs(float(saltus.energies(motion, periods=10).attrs["defect"])) < 1e-12

@@ -27,6 +27,8 @@ def read_part(source: Source, kind: str, data: Any) -> dict[str, Any]:
         source.refuse((kind,), f'{kind}.type is missing; it names the {kind}, such as type = "{EXAMPLES[kind]}"')
     cls = find_class(source, kind, read(source, (kind, "type"), data["type"], read_text))
     values = {key: value for key, value in data.items() if key != "type"}
+    if isinstance(values.get("file"), str):  # of the matrices of a structure
+        values["file"] = str(source.path.parent / values["file"])
     return {"type": cls.__name__, **read_table(source, (kind,), values, readers_of(cls))}
 
 
