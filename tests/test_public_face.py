@@ -12,6 +12,7 @@ import time
 
 import numpy as np
 import pytest
+import sympy
 import xarray
 
 import saltus
@@ -36,6 +37,7 @@ BLOCK = saltus.System(
     model=saltus.RockingBlock(alpha=0.2),
     load=saltus.Load(ground_horizontal=saltus.HalfSine(amplitude=0.5, frequency=2.0, quantity="acceleration")),
 )
+X, V = sympy.symbols("x v")
 SI = saltus.PhysicalCell(length=0.1, upper_mass=1.0, upper_stiffness=2.0)
 ROOMS = ("attractors", "flow", "orbits", "studies", "sweep", "systems", "theory")
 # Formulas, which are called with numbers, arrays and the symbols of the tracer alike and check nothing; and how orbits are made.
@@ -280,7 +282,8 @@ def good(made):
         "TwoLayer": (saltus.TwoLayer, {"beta0": 1.4}),
         "TwoStops": (saltus.TwoStops, {}),
         "UnitCell": (saltus.UnitCell, {"alpha0": 0.3, "beta0": 1.4}),
-        **{f"{name}Cells": (getattr(saltus, f"{name}Cells"), {"beta0": 1.4}) for name in ("Two", "Three", "Four")},
+        "CellChain": (saltus.CellChain, {"beta0": 1.4}),
+        "saltus.from_sympy": (saltus.from_sympy, {"coordinates": [X], "velocities": [V], "force": [-X], "parameters": {}}),
         **{
             f"UnitCell.{name}": (getattr(CELL, name), {"theta": 0.1})
             for name in ("alpha", "beta", "eta", "phi", "small_phi", "xi")

@@ -89,6 +89,7 @@ from .systems.cell_chain import CellChain as CellChain
 from .systems.contact_model import Contact as Contact
 from .systems.contact_model import Friction as Friction
 from .systems.contact_model import Surface as Surface
+from .systems.from_symbols import from_sympy as from_sympy
 from .systems.impact_laws import InelasticImpact as InelasticImpact
 from .systems.impact_laws import NewtonImpact as NewtonImpact
 from .systems.impact_laws import PoissonImpact as PoissonImpact
