@@ -351,3 +351,16 @@ def test_friction_that_falls_with_the_speed_holds_its_equation():
             (v,), bend = motion.at([t])[1], (motion.at(t + h)[1] - motion.at(t - h)[1]) / (2 * h)
             mu = 0.15 + 0.15 * np.exp(-abs(v - 0.3) / 0.2)
             assert abs(bend + motion.at(t)[0] + s * mu) < 1e-6
+
+
+def test_ensembles_and_orbits_take_friction_in_contacts():
+    starts = np.array([0.5, 1.0, 2.0])
+    many = saltus.simulate_many(slider(), x=0.0, y=1.0, velocity=(starts, np.zeros(3)), duration=6.0)
+    for place, start in enumerate(starts):
+        one = saltus.simulate(slider(), x=0.0, y=1.0, velocity=(float(start), 0.0), duration=6.0)
+        assert abs(float(many["x"].values.ravel()[place]) - one.x) < 1e-11
+    load = saltus.Load(frequency=1.0, push=saltus.Harmonic(0.6), lift=saltus.Harmonic(1.5))
+    orbit = saltus.find_orbit(slider(angle=0.0, e=0.3, load=load).with_({"model.wall": 0.8}), x=0.0, y=0.0)
+    motion = orbit.motion()
+    assert np.abs(motion.position[1] - motion.at(motion.start)[0][1]) < 1e-11
+    assert {"release", "impact"} <= set(kinds(motion))
