@@ -123,7 +123,7 @@ def first_friction(motion, count, h, whole):
     order, hit, first, which, shorter = motion.order, -1, NEVER, 2, False
     for k in range(motion.frictions.shape[0]):
         slides, skip = motion.frictions[k, FrictionColumn.SLIDES], motion.frictions[k, FrictionColumn.SKIP]
-        for b in range(0 if slides == 2 or leans(motion, k) else 2):
+        for b in range(0 if slides == 2 or (slides == 0 and leans(motion, k)) else 2):
             known, guard = skip, motion.gap_series
             if slides == 0:
                 known, guard = (
