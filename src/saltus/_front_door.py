@@ -68,7 +68,8 @@ class Room(ModuleType):
 
     def __call__(self, *given: Any, **named: Any) -> Any:
         own = self.__name__.rpartition(".")[2]
-        meant = [name for name in self.__all__ if own[:-1] in name and name.islower()]
+        named = dict.fromkeys((*self.__all__, *vars(sys.modules["saltus"]).get("__all__", ())))
+        meant = [name for name in named if own[:-1] in name and name.islower() and name != own]
         hint = near(own, meant) if meant else "use one of its functions"
         raise ParameterError(f"{self.__name__} is a package, not a function; {hint}")
 

@@ -71,13 +71,13 @@ class CellChain(LayeredCell, ContactModel):
         check_count("cells", self.cells, at_least=1, at_most=MOST_CONTACTS // 2)
         object.__setattr__(self, "cells", Count(self.cells))
 
-    @property  # type: ignore[override]  # a class whose numbers say how many coordinates it has
-    def coordinates(self) -> tuple[str, ...]:
+    @property
+    def coordinates(self) -> tuple[str, ...]:  # type: ignore[override]  # a class whose numbers say how many it has
         """The angles of the lower and of the upper layer of each cell."""
         return _names(self.cells)
 
-    @property  # type: ignore[override]
-    def stops(self) -> tuple[str, ...]:
+    @property
+    def stops(self) -> tuple[str, ...]:  # type: ignore[override]
         """All margins: no layer has positions beyond its kinematic limit."""
         return tuple(f"{name}_kinematic_limit" for name in self.coordinates)
 

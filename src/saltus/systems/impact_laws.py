@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.checks import answered, check_number, settle_numbers
 from saltus.errors import ParameterError
-from saltus.systems.contact_model import Contact, ContactModel, mass_rows
+from saltus.systems.contact_model import Contact, ContactModel, Friction, mass_rows
 from saltus.systems.gap_coordinates import in_gap_coordinates
 from saltus.systems.load import Load
 from saltus.systems.model import Model, OneContactModel
@@ -364,7 +364,7 @@ def check_paradox(model: ContactModel) -> None:
     mass = np.array(mass_rows(model, (0.5,) * len(names)), dtype=float)
     places = [(names.index(f.coordinate), contacts[str(f.contact)]) for f in pressed]
     own = {place for t, contact in places for place in (t, names.index(contact.coordinate))}
-    parts = (*model.contacts, *model.frictions)
+    parts: tuple[Contact | Friction, ...] = (*model.contacts, *model.frictions)
     others = sorted({names.index(part.coordinate) for part in parts} - own) if mass[list(own)].any() else []
     for held in itertools.product((False, True), repeat=len(others)):
         for ways in itertools.product((None, 0, 1, -1), repeat=len(pressed)):

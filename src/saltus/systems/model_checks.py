@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import ParameterError, SaltusError, shown
-from saltus.systems.contact_model import MOST_CONTACTS, MOST_FRICTIONS, Contact, ContactModel, Surface, sides_for
+from saltus.systems.contact_model import MOST_CONTACTS, MOST_FRICTIONS, Contact, ContactModel, Friction, Surface, sides_for
 from saltus.systems.gap_coordinates import InGapCoordinates, Part
 from saltus.systems.impact_laws import ImpactLaw, check_paradox
 from saltus.systems.load import DeclaredLoad, Load
@@ -128,7 +128,8 @@ def _check_first_order(model: Model) -> None:
     if jumps and not (given and model.contacts):
         what = "no contact" if given else "no coordinate of first order, such as first_order = ('voltage',)"
         raise ParameterError(f"{kind} defines after_impact and has {what}: leave it out", "model")
-    for part in (*model.contacts, *model.frictions, *model.surfaces):
+    parts: tuple[Contact | Friction | Surface, ...] = (*model.contacts, *model.frictions, *model.surfaces)
+    for part in parts:
         terms = [part.coordinate] if isinstance(part.coordinate, str) else list(part.coordinate)
         held = [name for name in terms if name in given]
         if held and not (isinstance(part, Surface) and len(terms) == 1):
@@ -303,9 +304,9 @@ def _check_mass(model: ContactModel) -> None:
     if model.jumps and size > 1:
         other = _asked(model, "mass_matrix", tuple(PROBE[1] / (1 + i) if i < moving else PROBE[2] for i in range(size)))
         if other is None or not np.array_equal(np.array(found, dtype=float), np.array(other, dtype=float)):
-            names = ", ".join(model.first_order)
+            jumping = ", ".join(model.first_order)
             raise ParameterError(
-                f"{kind.__name__}.mass_matrix depends on {names}, which jumps at impacts: leave one out", "model"
+                f"{kind.__name__}.mass_matrix depends on {jumping}, which jumps at impacts: leave one out", "model"
             )
     for i, j in itertools.combinations(range(size), 2):
         a, b = found[i][j], found[j][i]
@@ -362,9 +363,10 @@ def _check_sum(model: ContactModel, contact: Part) -> None:
         )
 
 
-def _named(part: Contact | Surface) -> str:
+def _named(part: Contact | Surface | Friction) -> str:
     """What a part is called, with the verb for what it does to its coordinate: a motion passes a surface."""
-    return f"the contact {part.name!r} holds" if isinstance(part, Contact) else f"the surface {part.name!r} is of"
+    verb = "holds" if isinstance(part, Contact) else "rubs on" if isinstance(part, Friction) else "is of"
+    return f"the {type(part).__name__.lower()} {part.name!r} {verb}"
 
 
 def _check_moving_walls(model: InGapCoordinates) -> None:

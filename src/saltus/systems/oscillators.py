@@ -249,8 +249,8 @@ class BeltOscillator(ContactModel):
     @property
     def frictions(self) -> tuple[Friction, ...]:
         """The friction of the belt."""
-        given = {"kinetic": self.kinetic, "static": self.static, "ground_speed": self.belt_speed}
-        return (Friction(name="belt", coordinate="x", **given),)
+        belt = Friction(name="belt", coordinate="x", kinetic=self.kinetic, static=self.static, ground_speed=self.belt_speed)
+        return (belt,)
 
     def normal_forces(self, t: Any, x: Any, velocity: Any, load: Load) -> tuple[Any, ...]:
         """N plus the load's `normal`."""

@@ -307,7 +307,7 @@ class Structure(ContactModel):
         given = np.asarray(of, dtype=float)
         if given.shape[:1] != (len(self.names),):
             raise ParameterError(f"displacements takes {len(self.names)} coordinates along the first axis, got {shown(of)}", "of")
-        return np.asarray(self._basis @ given)
+        return np.asarray(vars(self)["_basis"] @ given)
 
     def start(self, displacement: Any = 0.0, velocity: Any = 0.0) -> dict[str, Any]:
         """The state with these displacements u and velocities u', by the names of the arguments of `simulate`.
@@ -320,7 +320,7 @@ class Structure(ContactModel):
         found = []
         for name, given in (("displacement", displacement), ("velocity", velocity)):
             vector = _vector(np.full(len(self.names), given) if np.ndim(given) == 0 else given, self.names, name)
-            found.append([float(x) for x in np.linalg.solve(self._basis, vector)])
+            found.append([float(x) for x in np.linalg.solve(vars(self)["_basis"], vector)])
         local = [self.names.index(name) if name in self.names else None for name in self.form[0]]
         for values, given in zip(found, (displacement, velocity), strict=True):
             for i, row in enumerate(local):  # exactly as given, so that what is at a contact is there

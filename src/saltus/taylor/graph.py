@@ -16,8 +16,10 @@ from saltus.taylor.rules import FUNCTIONS
 
 # The operations without Taylor recurrence that a reset may use, because it is evaluated at one instant only.
 POINTWISE = ("greater", "less", "greater_equal", "less_equal", "where", "maximum", "minimum")
-LEAVES = ("number", "parameter", "time", "origin", "side", "free", "slide", "coordinate", "velocity", "acceleration", "record")
-LEAVES += ("form", "mode")  # sums over modes, and the accelerations of modes (see `memory.py`)
+LEAVES = (
+    *("number", "parameter", "time", "origin", "side", "free", "slide", "coordinate", "velocity", "acceleration", "record"),
+    *("form", "mode"),  # sums over modes, and the accelerations of modes (see `memory.py`)
+)
 RECORD_WIDTH = 5  # coefficients of a record's piece: a cubic spline of velocity makes a quartic displacement
 
 ALLOWED = (

@@ -211,13 +211,15 @@ class ModeSum(NamedTuple):
     amplitudes: int
     rates: int | None  # None: the sum has none
     first: int  # the coordinate that is the first mode, of the motion or of a column of its tangent
-    count: int
+    count: int  # type: ignore[assignment]  # of modes; a tuple has a method of this name
 
     def written_out(self) -> Expr:
         """The sum as an expression."""
         total = number(0.0)
         for start, op in ((self.amplitudes, "coordinate"), (self.rates, "velocity")):
-            for i in range(self.count if start is not None else 0):
+            for i in range(self.count):
+                if start is None:
+                    break
                 total = total + Expr("parameter", (), start + i) * Expr(op, (), self.first + i)
         return total
 

@@ -305,7 +305,8 @@ class ModeLoops:
 
     @property
     def _one(self) -> Vec:
-        return self.series.memory.arithmetic.number(self.b, 1.0)
+        one: Vec = self.series.memory.arithmetic.number(self.b, 1.0)
+        return one
 
     def _lifted(self, value: Any) -> Vec:
         return value if isinstance(value, Vec) else self.series.memory.arithmetic.number(self.b, value)

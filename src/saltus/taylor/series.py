@@ -128,13 +128,13 @@ class Series:
             if self.starts:
                 for place, root in numbers:
                     self.memory.store(place, self.now(self.rows[root]))
-            rows = zip(self.positions.items(), self.velocities.values(), pulls, strict=True)
-            for (i, position), velocity, pull in rows:
+            motion = zip(self.positions.items(), self.velocities.values(), pulls, strict=True)
+            for (i, position), velocity, pull in motion:
                 self._integrate(position, self.now(velocity))
                 if i not in first_order:
                     self._integrate(velocity, self.now(pull))
-            for velocity, acceleration, row in slopes:
-                self._write_slope(velocity, acceleration, self.now(row))
+            for rate, acceleration, slope in slopes:
+                self._write_slope(rate, acceleration, self.now(slope))
             for pointer, row in kept:
                 self._write(pointer, self.now(row))
             if self.modes is not None:

@@ -120,7 +120,10 @@ class Trace:
 
     def mode_rows(self, places: Sequence[tuple[str, int]], kept: int) -> ModeRows | None:
         """Where the series of modes lie: the places of those of the first coordinate, and how many columns keep accelerations."""
-        return None if self.modes is None else ModeRows(self.modes, *places, self.columns, kept)
+        if self.modes is None:
+            return None
+        positions, velocities, accelerations = places
+        return ModeRows(self.modes, positions, velocities, accelerations, self.columns, kept)
 
     @property
     def inputs_of_modes(self) -> list[Expr]:

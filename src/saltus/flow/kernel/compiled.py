@@ -258,8 +258,9 @@ def _series(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
     leaves = LEAVES | _free(trace)
     places = Places(("t", "origin", "side", "env", "piece", "q", "v", "a", "g", "m", "w", "order"), leaves)
     modes, first_order = trace.mode_rows((("q", 0), ("v", 0), ("a", 0)), 1 + trace.columns), trace.first_order_rows
-    parts = (*([(name, i) for i in rows] for name in ("q", "v")), targets, MOST_COEFFICIENTS)
-    layout = Rows(*parts, any_order=True, first_order=first_order, coordinates=rows, modes=modes)
+    positions, velocities = ([(name, i) for i in rows] for name in ("q", "v"))
+    most = MOST_COEFFICIENTS
+    layout = Rows(positions, velocities, targets, most, True, first_order=first_order, coordinates=rows, modes=modes)
     roots = [*(trace.acceleration[i] for i in rows), *motion_roots(trace), *inputs]
     return _function("series", places, SeriesOf(layout, tape(roots, known, series=True)))
 

@@ -215,9 +215,10 @@ def _series(trace: Trace, plan: MemoryPlan, known: dict[Expr, int]) -> WrittenFu
     positions, velocities, kept = (rows(part, plan.rows) for part in (parts.positions, parts.velocities, parts.accelerations))
     targets = [*(kept[i] if i < plan.own else None for i in own), *rows(parts.margins, plan.stops), *[None] * len(inputs)]
     modes = trace.mode_rows((positions[0], velocities[0], kept[0] if kept else ("m", 0)), 1)
-    margins, places = motion_roots(trace)[trace.gap is not None :], ([part[i] for i in own] for part in (positions, velocities))
+    margins = motion_roots(trace)[trace.gap is not None :]
+    moving, rates = ([part[i] for i in own] for part in (positions, velocities))
     first_order, length = trace.first_order_rows, SERIES_LENGTH
-    layout = Rows(*places, targets, length, any_order=False, first_order=first_order, coordinates=own, modes=modes)
+    layout = Rows(moving, rates, targets, length, any_order=False, first_order=first_order, coordinates=own, modes=modes)
     leaves = Places(("m", "order"), _leaves(plan, SLOTS.now, parts.position, parts.velocity))
     expanded = [*(trace.acceleration[i] for i in own), *margins, *inputs]
     return _function("lane_series", leaves, SeriesOf(layout, tape(expanded, known, series=True)))
