@@ -68,8 +68,8 @@ class Room(ModuleType):
 
     def __call__(self, *given: Any, **named: Any) -> Any:
         own = self.__name__.rpartition(".")[2]
-        named = dict.fromkeys((*self.__all__, *vars(sys.modules["saltus"]).get("__all__", ())))
-        meant = [name for name in named if own[:-1] in name and name.islower() and name != own]
+        doors = (vars(sys.modules["saltus"]).get("__all__", ()), self.__all__)
+        meant = next((found for door in doors if (found := [n for n in door if own[:-1] in n and n.islower() and n != own])), [])
         hint = near(own, meant) if meant else "use one of its functions"
         raise ParameterError(f"{self.__name__} is a package, not a function; {hint}")
 
