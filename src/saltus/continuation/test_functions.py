@@ -79,7 +79,10 @@ def located(test: TestFunction, a: Any, b: Any, singular: bool = False) -> Zero 
     i = _bracket(known, before) if before != 0.0 else 0
     # beyond the zero of a one-sided function other equations hold: points before it must not be interpolated with those beyond
     best = known[i] if test.one_sided else min(known[i : i + 2], key=lambda place: abs(place.value))
-    evidence = Evidence(best.point.residual, _brackets(best.point, before, known), before, after, best.value)
+    brackets = _brackets(best.point, before, known)
+    if test.one_sided and i > 0:  # a residual that rounding keeps large leaves a way to the zero, as the places before it tell
+        brackets = tuple(map(float, np.maximum(brackets, 2.0 * _way_left(*known[i - 1 : i + 1]))))
+    evidence = Evidence(best.point.residual, brackets, before, after, best.value)
     zero: Zero = best.point.zero_type(test.kind, best.point, evidence)
     return zero
 
@@ -211,3 +214,10 @@ def _brackets(point: Any, before: float, known: list[KnownPlace]) -> tuple[float
         sides[(place.value > 0) == (before > 0)].append(np.abs(place.point.parameters - point.parameters))
     widths = np.max([np.min(side, axis=0) for side in sides.values() if side], axis=0)
     return tuple(map(float, widths))
+
+
+def _way_left(far: KnownPlace, near: KnownPlace) -> np.ndarray:
+    """How far, in each parameter, the zero is from the nearer of two places on one side of it, if the function is linear."""
+    fall = abs(far.value - near.value)
+    way = np.abs(near.point.parameters - far.point.parameters)
+    return way * (abs(near.value) / fall) if fall > 0.0 else 0.0 * way
