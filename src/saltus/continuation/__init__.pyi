@@ -12,13 +12,13 @@ from .end import End as End
 from .end import EndReason as EndReason
 from .end import Missed as Missed
 from .end import MissedReason as MissedReason
-from .events import Cut as Cut
-from .events import Events as Events
 from .predictor import STEPS as STEPS
 from .predictor import between as between
 from .pseudo_arclength import NEWTON as NEWTON
 from .pseudo_arclength import Corrected as Corrected
 from .pseudo_arclength import EquationCurve as EquationCurve
 from .pseudo_arclength import newton as newton
+from .test_functions import Cut as Cut
+from .test_functions import Events as Events
 from .test_functions import TestFunction as TestFunction
 from .test_functions import located as located

@@ -12,9 +12,8 @@ import numpy as np
 from saltus.continuation.course import Course, solved_between, turning_point
 from saltus.continuation.curve import Zero
 from saltus.continuation.end import CurveEnd, CurveMissed, End, Missed
-from saltus.continuation.events import Cut, Events
 from saltus.continuation.predictor import STEPS, StepSettings
-from saltus.continuation.test_functions import located
+from saltus.continuation.test_functions import Cut, Events, located
 from saltus.continuation.trail import Trail, TrailPoint
 from saltus.progress import Progress, silent
 

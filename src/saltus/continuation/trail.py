@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.continuation.events import Events
 from saltus.continuation.predictor import arc, between
+from saltus.continuation.test_functions import Events
 
 
 @dataclass(frozen=True)
