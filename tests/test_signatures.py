@@ -25,22 +25,28 @@ ALIKE = {
 }
 # Names with two meanings, which are those of the field in both: what a dimension, a figure of a formula or a file is called.
 SEVERAL = {
+    "channels": "the names of a load's channels with their symbols, or signals",
     "changes": "values by dotted path, or parts of a system too",
-    "coordinate": "the name of one, or the coefficients of a sum of several",
     "coordinates": "starts of one motion or of many, by the names of the model's coordinates",
+    "contacts": "the contacts of a model, or of a structure also by names of rows",
     "curves": "whether basins have their boundaries, or how many borders of a chart are followed",
+    "damping": "a coefficient, or the matrix of a structure",
     "data": "what was measured, or a system as a dictionary",
     "e": "a coefficient of restitution, one or a matrix of several contacts",
+    "equations": "of a model in symbols, or of an orbit",
     "functions": "quantities by name: of an orbit, of a motion, or of a motion at the times of a record",
     "known": "attractors, orbits or branches",
     "parameters": "values by dotted path, or the paths to differentiate to or to solve for",
     "path": "a parameter's dotted path, or that of a file",
     "periods": "forcing periods; of one motion also a fraction",
+    "points": "how many of a curve, or sums of displacements by name",
     "result": "one result, or to be drawn also several",
     "special": "one special point, or seeds of several",
     "start": "when a pulse begins, or the state with which a record begins",
     "starts": "how many initial states, or, of a phase portrait, which",
+    "stiffness": "a coefficient, or the matrix of a structure",
     "time": "when a motion begins, or the times of a record",
+    "velocity": "of a start, or at which a friction slides",
     "values": "of a parameter, or what was measured, or the unknowns of a fit",
 }
 # By which arguments a function takes names of its own: those of a model's coordinates, of a load's channels, of parameters, and

@@ -71,7 +71,7 @@ CASES = {
     "e": (MODEL + '[impact]\ntype = "VelocityReduction"\ne = 1.2\n', "impact.e must lie in [0, 1], got 1.2"),
     "impact_type": (
         MODEL + '[impact]\ntype = "Hertz"\n',
-        "EnergyRestitution, InelasticImpact, NewtonImpact, VelocityReduction",
+        "EnergyRestitution, InelasticImpact, NewtonImpact, PoissonImpact, VelocityReduction",
     ),
     "channel": (MODEL + "[load]\nvertcal = 1\n", "Metainterface does not read load.vertcal; did you mean 'vertical'"),
     "channel_dunder": (MODEL + "[load]\n__class__ = 1\n", 'load has no channel "__class__"'),

@@ -105,7 +105,7 @@ def sources(monkeypatch):
     """The texts handed to the compiler, without compiling them."""
     texts = []
 
-    def keep(kind, functions):
+    def keep(kind, functions, traced):
         texts.append(functions_text(functions))
         raise LookupError
 

@@ -267,7 +267,7 @@ def test_equations_that_are_compiled_within_minutes_are_not_refused():
 
 def test_derivatives_that_would_be_compiled_for_minutes_are_refused_with_the_estimate(monkeypatch):
     """The columns of sin(sin(... x)) share one chain of products of cosines: three loops for each sine, and one more."""
-    monkeypatch.setattr("saltus.taylor.tracing.LIMITS", replace(LIMITS, compiling=2.0))
+    monkeypatch.setattr("saltus.taylor.graph.LIMITS", replace(LIMITS, compiling=2.0))
     sentence = "Small with 2 columns of derivatives .* 1801 of them .* about 2.3 minutes to compile; what takes more than 2 is"
     with pytest.raises(TraceError, match=sentence):
         traced(nested(600), sensitivities=())
@@ -275,7 +275,7 @@ def test_derivatives_that_would_be_compiled_for_minutes_are_refused_with_the_est
 
 
 def test_lanes_take_three_times_as_long_to_compile(monkeypatch):
-    monkeypatch.setattr("saltus.taylor.tracing.LIMITS", replace(LIMITS, compiling=2.0))
+    monkeypatch.setattr("saltus.taylor.graph.LIMITS", replace(LIMITS, compiling=2.0))
     small, large = traced(nested(400)), traced(nested(600))
     check_size(small, lanes=True)
     with pytest.raises(TraceError, match="about 3 minutes to compile for an ensemble; what takes more than 2 is refused"):

@@ -112,7 +112,13 @@ class CellChain(LayeredCell, ContactModel):
         return matrix
 
     def displacements(self, theta: Any) -> list[tuple[Any, Any]]:
-        """(u_1, u_2) of each cell."""
+        """(u_1, u_2) of each cell.
+
+        Parameters
+        ----------
+        theta
+            The angles of all layers, radians, in the order of `coordinates`.
+        """
         base, found = np.cos(self.beta0), []
         for i in range(0, 2 * self.cells, 2):
             lower = base - np.cos(self.beta0 + theta[i])
@@ -139,7 +145,13 @@ class CellChain(LayeredCell, ContactModel):
         return sum(one.kinetic_energy(t, theta[i : i + 2], velocity[i : i + 2], side, load) for i in range(0, size, 2))
 
     def potential_energy(self, theta: Any) -> Any:
-        """Pi / K2 of all springs, those between the cells included."""
+        """Pi / K2 of all springs, those between the cells included.
+
+        Parameters
+        ----------
+        theta
+            The angles of all layers, radians, in the order of `coordinates`.
+        """
         one, u, size = self.cell(), self.displacements(theta), 2 * self.cells
         between = sum((a[j] - b[j]) * (a[j] - b[j]) for a, b in pairwise(u) for j in (0, 1))
         return sum(one.potential_energy(theta[i : i + 2]) for i in range(0, size, 2)) + self.coupling * between / 2

@@ -106,7 +106,7 @@ class Friction:
     >>> saltus.Friction(name="belt", coordinate="x", kinetic=0.2, static=0.3, ground_speed=0.5).static
     0.3
     >>> falling = saltus.Friction(name="belt", coordinate="x", kinetic=0.2, static=0.3, stribeck_speed=0.1)
-    >>> round(falling.coefficient(0.1), 6)
+    >>> round(float(falling.coefficient(0.1)), 6)
     0.236788
     """
 
@@ -120,8 +120,7 @@ class Friction:
 
     @property
     def limit(self) -> str:
-        """The name of the limit at which a motion ends: the normal force does not press any more, or the reaction of the contact
-        is not the only one any more."""
+        """The name of the limit at which a motion ends: no normal force presses any more, or more than one reaction is possible."""
         return f"normal force of {self.name}" if self.contact is None else f"Painleve's paradox at {self.contact}"
 
     @property

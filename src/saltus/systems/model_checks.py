@@ -296,11 +296,8 @@ def _check_mass(model: ContactModel) -> None:
     moving = len(model.moving)
     others = [[float(found[i][j]) - (i == j) for j in range(size)] for i in range(moving, size)] if size > 1 else []
     if np.any(others) or (size > moving and size == 1):
-        raise ParameterError(
-            f"{kind.__name__}.mass_matrix must have the rows of the unit matrix for {', '.join(model.first_order)}, as "
-            "coordinates of first order have no inertia",
-            "model",
-        )
+        what = f"{', '.join(model.first_order)}, which have no inertia"
+        raise ParameterError(f"{kind.__name__}.mass_matrix must have the rows of the unit matrix for {what}", "model")
     if model.jumps and size > 1:
         other = _asked(model, "mass_matrix", tuple(PROBE[1] / (1 + i) if i < moving else PROBE[2] for i in range(size)))
         if other is None or not np.array_equal(np.array(found, dtype=float), np.array(other, dtype=float)):
@@ -337,8 +334,8 @@ def _is_row(found: Any) -> bool:
 
 def _check_sum(model: ContactModel, contact: Part) -> None:
     """Refuse a sum of coordinates and displacements of the ground that a contact cannot keep on one side."""
-    where = f"the {type(contact).__name__.lower()} {contact.name!r} of {type(model).__name__}"
     names, given = model.coordinates, contact.coordinate
+    where = f"the {type(contact).__name__.lower()} {contact.name!r} of {type(model).__name__}"
     if not isinstance(given, Mapping) or not given:
         raise ParameterError(
             f"{where} must be given a coordinate, or a dictionary such as {{'y': 1.0, 'x': -1.0}}, got {shown(given)}", "model"

@@ -152,6 +152,8 @@ class Structure(ContactModel):
         Sums of displacements by their names: the coefficients of all rows, (n,), or of some, {0: 1.0, "x5": -1.0}; or one row.
     names
         The names of the rows, by default x0, x1, ...
+    coefficients, form
+        Computed from the others and not to be given: the numbers of the equations, and which there are.
 
     Raises
     ------
@@ -169,8 +171,9 @@ class Structure(ContactModel):
     ('x1', 'mode_1')
     >>> moved = saltus.System(model=pair, impact=saltus.NewtonImpact(e=0.8))
     >>> motion = saltus.simulate(moved, **pair.start([0.0, 0.4]), duration=2.0)
-    >>> pair.displacements(motion).shape == (2, motion.time.size)
-    True
+    >>> positions, velocities = motion.at([0.5, 1.0])
+    >>> pair.displacements(positions).shape
+    (2, 2)
     """
 
     mass: Any = None
@@ -280,7 +283,13 @@ class Structure(ContactModel):
         return found[0] if own.size == 1 else tuple(found)
 
     def mode_equations(self, t: Any, theta: Any, velocity: Any, load: Any) -> tuple[Any, Any, list[tuple[Any, Any, int, float]]]:
-        """w^2 and D of the modes; their inputs, each with its first coefficient, the step to that of the next mode, a sign."""
+        """w^2 and D of the modes; their inputs, each with its first coefficient, the step to that of the next mode, a sign.
+
+        Parameters
+        ----------
+        t, theta, velocity, load
+            The time, the local displacements, their rates, and the load, as `force` takes them.
+        """
         own, found = Equations(self), list[tuple[Any, Any, int, float]]()
         m, channels = own.local, list(self.forces)
         found += [(x, own.stiffness[i][m], 1, -1.0) for i, x in enumerate(theta)]
