@@ -382,7 +382,14 @@ def test_the_help_of_the_command_line_imports_no_numpy() -> None:
 
 
 SCRIPTS = sorted((SOURCE.parents[1] / "examples").glob("*.py"))
-LONGEST = {"chaos.py", "basins.py", "response_spectrum.py"}  # seconds each; the gallery of `make docs` runs all of them
+LONGEST = {
+    "chaos.py",
+    "basins.py",
+    "response_spectrum.py",
+    "erosion.py",
+    "ten_masses.py",
+    "soft_stop.py",
+}  # seconds each; the gallery of `make docs` runs all of them
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda p: p.name)

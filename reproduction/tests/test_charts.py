@@ -217,6 +217,7 @@ def early_chaos(periods):
     return found["exponent"].values[moving, 0], found["error"].values[moving, 0], states[moving]
 
 
+@pytest.mark.thorough
 def test_erratum_32_is_withdrawn_as_there_is_chaos_at_half_the_frequency_and_a_small_load():
     exponent, error, states = early_chaos(600)
     assert exponent.size

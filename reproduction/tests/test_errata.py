@@ -65,6 +65,7 @@ def panels():
     return found
 
 
+@pytest.mark.thorough
 def test_erratum_24_past_the_critical_load_rest_is_left_and_taken_up_again_in_every_period():
     assert verdicts({"fig11-undeformed": _undeformed(panels())}) == {"fig11-undeformed": ClaimVerdict.CORRECTED}
     # by the equation itself: the lower layer is pulled off while H sin(beta0) + V cos(beta0) > 0, for a share of the period only

@@ -67,6 +67,7 @@ def test_exact_evaluations_count_from_impact_to_impact():
     assert count > 1000
 
 
+@pytest.mark.thorough
 def test_every_claim_of_the_study_holds():
     found = verdicts(FIGURES["smoothing"].measure(data()))
     ours = {id for id, verdict in found.items() if verdict is ClaimVerdict.HOLDS}

@@ -51,6 +51,7 @@ def test_the_exponents_of_an_orbit_are_those_of_its_multipliers_and_closed_conta
     assert found.agrees
 
 
+@pytest.mark.thorough
 def test_many_exponents_between_two_walls_are_those_of_one():
     many = lyapunov_many(CHAOTIC, x=[0.1, 0.3], velocity=0.5, periods=1500, transient=50)
     one = lyapunov_spectrum(CHAOTIC, x=0.1, velocity=0.5, periods=1500, transient=50, two_trajectories=False)

@@ -47,6 +47,7 @@ def test_a_stick_slip_cycle_without_a_load_has_the_exponents_0_and_minus_infinit
     assert "round a cycle, which has no forcing period" in verdict.reason
 
 
+@pytest.mark.thorough
 def test_chaos_with_stick_and_slip_has_the_exponent_of_two_neighbouring_motions():
     verdict = classify(CHAOTIC, x=0.1, velocity=0.0, periods=900, transient=200)
     assert str(verdict.kind) == "chaotic"

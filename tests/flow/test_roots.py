@@ -80,6 +80,7 @@ def polynomials(draw):
     return expand(roots, pairs, 10.0 ** draw(st.integers(-12, 3)))
 
 
+@pytest.mark.thorough
 @given(polynomials())
 @settings(max_examples=200, deadline=None)
 def test_no_crossing_is_missed_and_none_invented(p):

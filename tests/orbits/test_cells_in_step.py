@@ -71,6 +71,7 @@ def test_multipliers_are_the_rate_at_which_a_motion_beside_it_comes_back(in_step
     assert (apart[1] / apart[0]) ** 0.1 == pytest.approx(largest, rel=1e-3)
 
 
+@pytest.mark.thorough
 def test_rounding_makes_no_special_points_along_their_branch(in_step: saltus.PeriodicOrbit, branch: saltus.Branch) -> None:
     """What the cells do at one instant comes in an order that rounding decides, at each point anew."""
     assert not branch.special

@@ -176,6 +176,7 @@ def beside_an_event(orbit: saltus.PeriodicOrbit) -> saltus.PeriodicOrbit:
     return found
 
 
+@pytest.mark.thorough
 def test_a_section_that_moves_to_another_forcing_period_does_not_turn_a_branch_round() -> None:
     """Of orbits of three periods: the branch goes through its fold from bound to bound, though its sections move. The state at
     the section after that is on the motion from the one before, by which a loop is seen to close."""

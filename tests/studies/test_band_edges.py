@@ -46,6 +46,7 @@ def test_the_branches_turn_where_the_cascade_of_period_doublings_begins(branches
     assert 2.0 < ratio < 20.0  # towards 4.669 (Feigenbaum)
 
 
+@pytest.mark.thorough
 def test_chaos_begins_where_the_stable_orbit_grazes(branches, bands):
     """Below the grazing, which continuation locates to 1e-10, the motion has period 1; above it is chaotic at once."""
     grazing = min(point.parameter for point in turning_points(branches) if point.kind == SpecialKind.GR)

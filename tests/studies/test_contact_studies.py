@@ -173,6 +173,7 @@ def test_a_search_finds_the_orbit_of_both_layers_and_says_what_it_searched():
     assert len(both.window) == 4
 
 
+@pytest.mark.thorough
 def test_what_the_massless_hinge_ends_is_neither_rest_nor_settled():
     """Without mass, under a large load: each motion ends at the hinge, so that it is not known where it would have gone."""
     pressed = layers(TwoLayer, amplitude=0.9).with_({"load.vertical": -1.0})
@@ -213,6 +214,7 @@ def test_a_chart_between_stops_has_the_closed_form_as_its_border():
     assert (beside <= 1.02 * ends["uncertainty"] * 0.04).all()
 
 
+@pytest.mark.thorough
 def test_what_simulation_says_of_the_ends_of_motions_of_both_layers_continuation_says_too():
     """A sample of them is solved for as orbits; and where a gap touches without speed a motion goes on."""
     both = layers(TwoLayer, amplitude=0.5).with_({"impact": NewtonImpact(e=0.0)})

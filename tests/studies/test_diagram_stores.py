@@ -69,6 +69,7 @@ def test_a_store_changes_no_number_and_remembers_all_of_them(alone, kept, monkey
     xr.testing.assert_identical(diagram(store=store), alone)
 
 
+@pytest.mark.thorough
 def test_what_an_effort_does_not_follow_in_windows_of_chaos_is_listed_with_its_reason(monkeypatch):
     """Without branches of such motions there are fewer, and each of these motions is a dot; none of a wide range is left."""
     few = {"max_period": 6}
@@ -95,6 +96,7 @@ def test_killed_at_several_moments_a_search_goes_on_to_the_same_bytes(kept, tmp_
     assert files(computed(tmp_path)) == files(kept)
 
 
+@pytest.mark.thorough
 def test_killed_and_interrupted_a_search_with_several_contacts_goes_on_to_the_same_bytes(tmp_path):
     def stop(_, what):
         if "following" in what:
@@ -146,6 +148,7 @@ def test_a_cluster_of_which_a_worker_dies_gives_the_same_diagram(alone, tmp_path
     xr.testing.assert_identical(diagram(store=store), alone)
 
 
+@pytest.mark.thorough
 def test_more_values_and_starts_extend_a_store_and_equal_a_fresh_search(kept, tmp_path):
     store, more = tmp_path / "diagram.zarr", {"values": np.linspace(*BOUNDS, 5), "starts": 6}
     shutil.copytree(kept / "diagram.zarr", store)

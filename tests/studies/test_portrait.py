@@ -184,6 +184,7 @@ def test_undamped_separatrices_have_the_energy_of_their_saddle():
         np.testing.assert_allclose(row[np.isfinite(row)], own, atol=1e-9)
 
 
+@pytest.mark.thorough
 def test_damped_separatrices_are_those_of_the_paper_module():
     """`saltus_paper.figures.manifolds` integrates backward by SciPy, with events of its own."""
     system, data = steady(H=0.05), portrait(0.1, 0.05)

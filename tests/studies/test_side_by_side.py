@@ -29,6 +29,7 @@ def cores(monkeypatch):
     return use
 
 
+@pytest.mark.thorough
 def test_a_diagram_does_not_depend_on_whether_its_parts_run_at_the_same_time(cores, monkeypatch):
     """Within the first chaos of Fig. 11, with two random samples."""
     monkeypatch.setitem(EFFORTS, Effort.QUICK, replace(EFFORTS[Effort.QUICK], samples=2))

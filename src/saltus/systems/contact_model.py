@@ -120,7 +120,7 @@ class Friction:
 
     @property
     def limit(self) -> str:
-        """The name of the limit at which a motion ends: no normal force presses any more, or more than one reaction is possible."""
+        """The name of the limit at which a motion ends: no normal force presses, or more than one reaction is possible."""
         return f"normal force of {self.name}" if self.contact is None else f"Painleve's paradox at {self.contact}"
 
     @property
