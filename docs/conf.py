@@ -1,6 +1,7 @@
 """How the site is built: `make docs`. Pages are Markdown, the reference comes from the code, the gallery from examples/."""
 
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 HERE = Path(__file__).parent
@@ -49,6 +50,7 @@ sphinx_gallery_conf = {
     "examples_dirs": ["../examples"],
     "gallery_dirs": ["gallery"],
     "filename_pattern": r"\.py$",
+    "ignore_pattern": r"__init__\.py" if find_spec("optax") else r"__init__\.py|in_jax\.py",  # JAX is not installed for the site
     "plot_gallery": "True",
     "within_subsection_order": "gallery_order.InOrder",
     "image_scrapers": ("matplotlib",),

@@ -1,0 +1,57 @@
+"""
+A fit by optax, in JAX
+======================
+
+Gradients of motions with impacts in JAX: an optimiser of optax finds damping, restitution and start of a metainterface. It needs
+`pip install "saltus[jax]" optax`."""
+
+import jax
+import jax.numpy as jnp
+import matplotlib.pyplot as plt
+import numpy as np
+import optax
+
+import saltus
+
+jax.config.update("jax_enable_x64", True)  # motions are exact to more digits than 32 bits have
+
+system = saltus.System(
+    model=saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1),
+    load=saltus.Load(frequency=1.0, horizontal=saltus.Harmonic(amplitude=0.5), vertical=-0.5),
+    impact=saltus.VelocityReduction(0.9),
+)
+times = np.linspace(0.0, 8.0, 81)
+theta = saltus.simulate(system, theta=0.3, velocity=0.1, duration=8.0).at(times)[0]  # what was measured
+states = saltus.to_jax(system, times=times)
+
+
+def misfit(unknown):
+    """The mean square of the difference from the data."""
+    return jnp.mean((states(unknown["values"], unknown["start"])[:, 0] - theta) ** 2)
+
+
+unknown = {"values": {"model.damping": 0.2, "impact.e": 0.8}, "start": jnp.array([0.35, 0.0])}
+unknown = jax.tree.map(jnp.asarray, unknown)
+optimiser, history = optax.lbfgs(), [1.0]
+
+
+@jax.jit
+def improved(unknown, state):
+    """What is unknown after one more step, with the misfit before it."""
+    value, gradient = optax.value_and_grad_from_state(misfit)(unknown, state=state)
+    moves, state = optimiser.update(gradient, state, unknown, value=value, grad=gradient, value_fn=misfit)
+    return optax.apply_updates(unknown, moves), state, value
+
+
+state = optimiser.init(unknown)
+while len(history) < 40 and history[-1] > 1e-20:
+    unknown, state, value = improved(unknown, state)
+    history.append(float(value))
+found = [*map(float, unknown["values"].values()), *map(float, unknown["start"])]
+print(f"after {len(history) - 1} steps: impact.e, damping, theta, theta' = {np.round(found, 9)}")
+
+figure, ax = plt.subplots()
+ax.semilogy(history[1:], "o-")
+ax.set(xlabel="step of L-BFGS", ylabel="mean square of the misfit")
+assert np.allclose([unknown["values"][path] for path in ("model.damping", "impact.e")], [0.1, 0.9], atol=1e-9)
+assert np.allclose(unknown["start"], [0.3, 0.1], atol=1e-9)
