@@ -224,7 +224,7 @@ def _brackets(point: Any, before: float, known: list[KnownPlace]) -> tuple[float
 def _way_left(far: KnownPlace, near: KnownPlace) -> np.ndarray:
     """How far, in each parameter, the zero is from the nearer of two places on one side of it, if the function is linear."""
     fall = abs(far.value - near.value)
-    way = np.abs(near.point.parameters - far.point.parameters)
+    way: np.ndarray = np.abs(near.point.parameters - far.point.parameters)
     return way * (abs(near.value) / fall) if fall > 0.0 else 0.0 * way
 
 

@@ -118,7 +118,7 @@ class Series:
             for i, (place, root) in enumerate(zip(self.layout.roots, roots, strict=False))
             if place and i not in first_order
         ]
-        slopes = [(*(place and self.memory.pointer(place) for place in places), row) for *places, row in self._slopes]
+        slopes: list[Any] = [(*(place and self.memory.pointer(place) for place in places), row) for *places, row in self._slopes]
         numbers = zip(self.layout.numbers, roots[len(self.layout.roots) :], strict=True)
         self.modes = mode_loops(self, roots)
         for _ in self._each_order():

@@ -78,10 +78,10 @@ def to_jax(
         if not np.isfinite(asked).all() or not (asked >= time).all():
             raise ParameterError(f"times must be finite and not before the start, {time:g}", "times")
         duration = float(np.max(asked, initial=time)) - time
-    request = {"periods": periods, "duration": duration, "tol": tol, "time": time, "side": side}
+    request: dict[str, Any] = {"periods": periods, "duration": duration, "tol": tol, "time": time, "side": side}
     request |= {"stop_at": check_names("stop_at", stop_at, "margins"), "dense": times is not None}
     somewhere = dict.fromkeys(system.model.coordinates, 0.0)
-    MotionRequest(system=system, coordinates=somewhere, velocity=0.0, **request)  # type: ignore[arg-type]
+    MotionRequest(system=system, coordinates=somewhere, velocity=0.0, **request)
     return _StatesFunction(system, times, request).states
 
 
