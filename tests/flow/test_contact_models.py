@@ -2,16 +2,23 @@
 
 import math
 import pickle
+import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import saltus
 from saltus import CellChain, Contact, ContactModel, ImpactPair, NewtonImpact, TwoLayer, TwoStops
+from saltus.checks import LIMITS
 from saltus.errors import ParameterError
 from saltus.flow import EventKind
 from saltus.flow.contacts.complementarity import acting, by_exchange
+from saltus.flow.kernel import compiled
 from saltus.systems import Harmonic, Load, System, VelocityReduction, energy_gain
+from saltus.taylor.generated import llvm_text, object_code
+from saltus.taylor.graph import is_long
+from saltus.taylor.tracing import trace
 
 COSINE = math.pi / 2  # the phase of a harmonic that makes it one
 BETA80 = math.radians(80)
@@ -226,6 +233,28 @@ def test_cells_that_move_alike_move_as_one_for_any_number_of_them(cells):
     assert any(event.contact.count("+") == cells - 1 for event in motion.events if event.kind == EventKind.IMPACT)
     for cell in range(cells):
         np.testing.assert_allclose(motion.at(times)[0][2 * cell : 2 * cell + 2], alone.at(times)[0], rtol=0, atol=1e-8)
+
+
+def test_equations_of_many_coordinates_move_alike_without_the_passes_of_llvm(monkeypatch):
+    """The order of operations stays, and so the motion up to rounding; what is compiled so depends on the coordinates."""
+    assert [is_long(trace(chain(cells))) for cells in (3, 4, 5)] == [False, False, True]
+    system, theta, made = chain(2), state(2), []
+    for most in (LIMITS.optimised, 0):
+        monkeypatch.setattr("saltus.taylor.graph.LIMITS", replace(LIMITS, optimised=most))
+        monkeypatch.setattr(compiled, "_structures", {})
+        assert is_long(trace(system)) == (most == 0)
+        made.append(follow(system, theta, duration=6.0))
+    assert len(made[0].impacts) == len(made[1].impacts) > 2
+    np.testing.assert_allclose(made[0].at(6.0), made[1].at(6.0), rtol=0, atol=1e-13)
+
+
+@pytest.mark.thorough
+def test_equations_of_64_coordinates_compile_in_less_than_a_minute():
+    system = chain(32)
+    began = time.process_time()
+    traced = trace(system)
+    assert object_code(llvm_text(compiled.structure_functions(traced)), is_long(traced))
+    assert time.process_time() - began < 60.0
 
 
 @pytest.mark.parametrize(

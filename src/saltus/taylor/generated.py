@@ -149,9 +149,7 @@ def _operation(memory: Memory, op: str, args: list[Any]) -> Any:
 
 def stack_of_cache_lines(function: Any, line: int) -> None:
     """Align the stack such that each vector on it lies within one cache line; otherwise every use would touch two.
-
-    LLVM aligns the stack for variables, but not for values that it moves out of registers later.
-    """
+    LLVM aligns the stack for variables, but not for values that it moves out of registers later."""
     function.attributes.alignstack = line
 
 
@@ -181,10 +179,11 @@ def llvm_text(functions: Sequence[WrittenFunction]) -> str:
 
 def load_functions(kind: str, functions: Sequence[WrittenFunction], traced: Trace) -> dict[str, Pointer]:
     """Pointers to functions of a trace by their names: loaded from the disk, or written and compiled first."""
-    name = f"{kind}_{digest(functions_text(functions), written_by())}"
+    is_long = kind == "structure" and graph.is_long(traced)
+    name = f"{kind}_{digest(functions_text(functions), written_by(), str(is_long))}"
     with loading:  # a second thread must not load them again: the code that is replaced would be freed while pointers lead to it
         if name not in _loaded:
-            code = kept_bytes(f"{name}.o", lambda: object_code(told_before(traced, kind, llvm_text(functions))))
+            code = kept_bytes(f"{name}.o", lambda: object_code(told_before(traced, kind, llvm_text(functions)), is_long))
             _loaded[name] = Loaded(code, [function.name for function in functions])
     addresses = _loaded[name].addresses
     return {each.name: Pointer.to(addresses[each.name], written_type(each.signature)) for each in functions}
@@ -225,16 +224,16 @@ def _target_machine() -> Any:
     return target.create_target_machine(cpu=name, features=features, opt=3, **options)
 
 
-def object_code(text: str) -> bytes:
-    """The object file of LLVM's text, optimised."""
+def object_code(text: str, is_long: bool = False) -> bytes:
+    """The object file of LLVM's text, optimised; a long text goes without LLVM's passes, whose time grows faster than it."""
     with _LLVM:
         machine = _target_machine()
         module = binding.parse_assembly(text)
         module.data_layout = str(machine.target_data)
         module.verify()
-        _optimise(module, machine)
-        made: bytes = machine.emit_object(module)
-    return made
+        if not is_long:
+            _optimise(module, machine)
+        return bytes(machine.emit_object(module))
 
 
 def _optimise(module: Any, machine: Any) -> None:

@@ -358,17 +358,30 @@ def ask(model: Any, method: str, *arguments: Any) -> Any:
         raise TraceError(f"{name} failed while it was traced: {type(error).__name__}: {error}") from error
 
 
+def is_long(traced: Any) -> bool:
+    """Whether the equations of many coordinates have so many loops that they are compiled without LLVM's passes."""
+    return bool(traced.dof > LIMITS.optimised) and loop_count(_expanded(traced)) > traced.dof
+
+
+def _expanded(traced: Any) -> list[Expr]:
+    """The expressions of a trace that are expanded in series."""
+    gap = [] if traced.gap is None else [traced.gap]
+    return [*traced.acceleration, *traced.reactions, *traced.margins.values(), *gap]
+
+
 def check_size(traced: Any, lanes: bool = False) -> None:
-    """Refuse equations whose compilation would take minutes or hours; the time grows as the square of the number of loops.
+    """Refuse equations whose compilation would take minutes or hours; the time grows as the square of the number of loops. Of
+    equations that are compiled without LLVM's passes (`is_long`), what would take a minute takes a quarter, and so on.
 
     Raises
     ------
     TraceError
         The message has the estimate for one motion, for its derivatives if they are traced, or for vector `lanes`.
     """
-    expanded = [*traced.acceleration, *traced.reactions, *traced.margins.values(), *([] if traced.gap is None else [traced.gap])]
+    expanded = _expanded(traced)
     loops, nodes = loop_count(expanded), len(ordered(expanded))
-    minutes = max(loops / LIMITS.operations, nodes / LIMITS.nodes) ** 2
+    minutes = max(loops / LIMITS.operations, nodes / LIMITS.nodes)
+    minutes *= 0.25 if is_long(traced) and not lanes else minutes
     minutes *= (LIMITS.derivatives if traced.columns else 1.0) * (LIMITS.lanes if lanes else 1.0)
     most = LIMITS.compiling if traced.columns or lanes else 1.0
     if minutes > most:
