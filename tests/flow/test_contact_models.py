@@ -238,12 +238,15 @@ def test_cells_that_move_alike_move_as_one_for_any_number_of_them(cells):
 def test_equations_of_many_coordinates_move_alike_without_the_passes_of_llvm(monkeypatch):
     """The order of operations stays, and so the motion up to rounding; what is compiled so depends on the coordinates."""
     assert [is_long(trace(chain(cells))) for cells in (3, 4, 5)] == [False, False, True]
-    system, theta, made = chain(2), state(2), []
+    theta, made, codes = state(2), [], set()
     for most in (LIMITS.optimised, 0):
         monkeypatch.setattr("saltus.taylor.graph.LIMITS", replace(LIMITS, optimised=most))
         monkeypatch.setattr(compiled, "_structures", {})
+        system = chain(2)  # another one, as a system remembers its code
         assert is_long(trace(system)) == (most == 0)
         made.append(follow(system, theta, duration=6.0))
+        codes.add(*(structure.functions for _, structure in compiled._structures.values()))
+    assert len(codes) == 2
     assert len(made[0].impacts) == len(made[1].impacts) > 2
     np.testing.assert_allclose(made[0].at(6.0), made[1].at(6.0), rtol=0, atol=1e-13)
 
