@@ -248,7 +248,8 @@ class OrbitEquations(ABC):
         return float(self.impacts(solution)[1].min(initial=math.inf))
 
     def pressing(self, solution: Solution) -> float:
-        """A quantity that is negative if a contact that the equations take for closed would open; inf without closed contacts."""
+        """A quantity that is negative if a contact that the equations take for closed would open, or one that they take for open
+        is passed at the section; inf without either."""
         return math.inf
 
     # --- 5. halving and repeating --------------------------------------------------------------------------------------------

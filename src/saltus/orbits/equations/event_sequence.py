@@ -173,7 +173,7 @@ def _section_distance(motion: Motion, period: float) -> float:
     return float(min(after, before) / (after + before))
 
 
-STAYS = "the motion comes to rest with all coordinates held at contacts for good, which is no orbit to follow"
+STAYS = "the motion comes to rest with all coordinates held at contacts for good, which is no orbit to follow; start elsewhere"
 
 
 def section_of(

@@ -82,6 +82,13 @@ class OneContactEquations(OrbitEquations):
         """Whether the equations of the motion have a gap."""
         return self._run.trace.gap is not None
 
+    def pressing(self, solution: Solution) -> float:
+        """Without impacts the gap at the section: where nothing moves it has no minimum that could be negative."""
+        if self.signature.sides or not self.has_contact or self.passes_contact:
+            return math.inf
+        model: Any = self.system_at(solution.values).model
+        return float(model.gap(solution.unknowns[0], self.signature.side))
+
     @cached_property
     def passes_contact(self) -> bool:  # type: ignore[override]
         """Whether the contact is no singularity for any values of the parameters at `paths`, so that orbits pass through it."""

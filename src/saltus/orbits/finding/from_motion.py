@@ -13,6 +13,7 @@ from saltus.errors import MotionError
 from saltus.flow import (
     RECURRENCE,
     Motion,
+    Stop,
     last_states,
     load_releases,
     motions_from,
@@ -23,6 +24,7 @@ from saltus.flow import (
 )
 from saltus.orbits.branches.symmetry import divide, half, is_symmetric, keeps_symmetry
 from saltus.orbits.equations.contract import MotionToRead, OrbitEquations
+from saltus.orbits.equations.event_sequence import STAYS
 from saltus.orbits.equations.kinds import KINDS, equations_of
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
@@ -219,7 +221,13 @@ def orbit_from(base: OrbitEquations, state: dict[str, Any], periods: int) -> Per
 
 def orbit_near(base: OrbitEquations, state: dict[str, Any], periods: int) -> PeriodicOrbit | None:
     """The orbit with the signature of a motion over `periods` forcing periods from a state at phase 0, by Newton's method: the
-    first that is admissible of those of all kinds of equations."""
+    first that is admissible of those of all kinds of equations.
+
+    Raises
+    ------
+    MotionError
+        It rests for good.
+    """
     motion, orbit = MotionToRead(base.system, state, periods), None
     for kind in KINDS:
         read = kind.read(base, motion)
@@ -228,6 +236,8 @@ def orbit_near(base: OrbitEquations, state: dict[str, Any], periods: int) -> Per
             orbit = simplest(found)
         if orbit is not None and orbit.admissible:
             break
+    if orbit is not None and orbit.highest == orbit.lowest and orbit.motion().stop is Stop.REST:
+        raise MotionError(STAYS)
     return orbit
 
 
