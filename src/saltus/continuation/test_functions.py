@@ -13,6 +13,7 @@ import numpy as np
 from saltus.continuation.curve import Evidence, Zero
 from saltus.continuation.end import CurveEnd, End
 from saltus.continuation.predictor import between
+from saltus.continuation.pseudo_arclength import NEWTON
 
 if TYPE_CHECKING:
     from saltus.continuation.continuation_loop import Continuation
@@ -85,7 +86,7 @@ def located(test: TestFunction, a: Any, b: Any, singular: bool = False) -> Zero 
     # beyond the zero of a one-sided function other equations hold: points before it must not be interpolated with those beyond
     best = known[i] if test.one_sided else min(known[i : i + 2], key=lambda place: abs(place.value))
     brackets = _brackets(best.point, before, known)
-    if test.one_sided and i > 0:  # a residual that rounding keeps large leaves a way to the zero, as the places before it tell
+    if test.one_sided and i > 0 and best.point.residual > NEWTON.stalled:  # then rounding leaves a way to the zero
         brackets = tuple(map(float, np.maximum(brackets, 2.0 * _way_left(*known[i - 1 : i + 1]))))
     evidence = Evidence(best.point.residual, brackets, before, after, best.value)
     zero: Zero = best.point.zero_type(test.kind, best.point, evidence)
