@@ -44,17 +44,17 @@ slides, hops = (saltus.find_orbit(system.with_({"load.frequency": w}), z=0.0, x=
 branch = saltus.continue_orbit(slides, "load.frequency", (0.85, 0.99))
 swept = saltus.frequency_sweep(system, np.linspace(0.86, 1.0, 8), periods=300, z=0.0, x=0.0, y=0.0)
 print(slides, hops, saltus.classify(system, z=0.0, x=0.0, y=0.0), saltus.find_attractors(system, starts=24), sep="\n")
-
 figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.6), layout="constrained")
 for motion, name in ((hops.motion(), "slides and hops"), (slides.motion(), "slides")):  # the last one is used below
     times = np.linspace(motion.start, motion.time, 20001)
     position, velocity = motion.at(times)
     left.plot(position[1], velocity[1], label=name)
 left.set(xlabel="$x$", ylabel="$x'$")
-left.legend(loc="center")
-right.plot(branch.parameters, [point.amplitude for point in branch.orbits])
-right.plot(swept["value"], swept["amplitude"].values.T, "o")
+left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False)
+right.plot(branch.parameters, branch.amplitudes, "r--")
+right.plot(branch.parameters, np.where(branch.stable, branch.amplitudes, np.nan), "b-")
+right.plot(swept["value"], swept["amplitude"].values.T, "k.")
+right.legend(["unstable", "stable", "sweep"], loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False)
 right.set(xlabel="frequency of the force", ylabel="amplitude")
-
 rubs = 0.02 * (0.3 * ALONG - ACROSS * np.gradient(velocity[0], times)) * np.abs(velocity[1])  # mu R abs(x'), R by Newton's law
 assert abs(saltus.energies(slides).energy.sel(part="friction.rub") - np.trapezoid(rubs, times)) < 1e-7

@@ -43,16 +43,16 @@ folds = sorted(point.parameter for point in branch.special)
 found = saltus.find_attractors(system, window=((-1.5, 1.5), (-1.5, 1.5)), starts=128)
 swept = saltus.frequency_sweep(system, np.linspace(0.98, 1.02, 9), periods=300, x=-0.25, velocity=0.72)
 print(slides, sticks, saltus.classify(system, x=-0.25, velocity=0.72), f"folds at {folds}", found, sep="\n")
-
 figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.6), layout="constrained")
 for motion, name in ((slides.motion(), "slides"), (sticks.motion(), "sticks and slips")):
     left.plot(*motion.at(np.linspace(motion.start, motion.time, 800)), label=name)
 left.set(xlabel="$x$", ylabel="$x'$")
-left.legend(loc="center")
-right.plot(branch.parameters, [point.amplitude for point in branch.orbits])
-right.plot(swept["value"], swept["amplitude"].values.T, "o")
+left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False)
+right.plot(branch.parameters, branch.amplitudes, "r--")
+right.plot(branch.parameters, np.where(branch.stable, branch.amplitudes, np.nan), "b-")
+right.plot(swept["value"], swept["amplitude"].values.T, "k.")
+right.legend(["unstable", "stable", "sweep"], loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False)
 right.set(xlabel="frequency of the force", ylabel="amplitude")
-
 motion = slides.motion()  # Liouville: areas shrink by the integral of c + mu'(u) over the orbit, which slides backwards
 time = np.linspace(motion.start, motion.time, 2001)
 _, velocity = motion.at(time)

@@ -516,3 +516,13 @@ def test_what_is_no_orbit_is_refused_with_the_true_reason(system, start, sentenc
 def test_the_loss_that_the_refusal_asks_for_gives_an_orbit():
     orbit = find_orbit(forced(H=0.09, W=0.01, C=1.0, e=0.9), theta=0.01)
     assert orbit.rest_share > 0.5
+
+
+@pytest.mark.parametrize(
+    ("beta0", "H", "W", "theta", "velocity"), [(0.5, 1.0, 2.0, 0.0, 1.0), (1.0, 0.5, 3.0, -1.8218389092393839, 0.0)]
+)
+def test_what_rests_for_good_and_what_lies_beyond_its_contact_is_no_orbit(beta0, H, W, theta, velocity):
+    """Newton's method finds rest; once it found theta = -beta0, where only the other side has an equilibrium."""
+    system = forced(beta0=beta0, C=0.5, V=-1.0, H=H, W=W, e=0.5)
+    with pytest.raises(MotionError, match=r"comes to rest .* start elsewhere"):
+        find_orbit(system, theta=theta, velocity=velocity, settle=0, period=2)

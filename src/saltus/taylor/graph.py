@@ -370,8 +370,8 @@ def _expanded(traced: Any) -> list[Expr]:
 
 
 def check_size(traced: Any, lanes: bool = False) -> None:
-    """Refuse equations whose compilation would take minutes or hours; the time grows as the square of the number of loops. Of
-    equations that are compiled without LLVM's passes (`is_long`), what would take a minute takes a quarter, and so on.
+    """Refuse equations whose compilation would take minutes or hours; the time grows as the square of the number of loops, or in
+    proportion to a quarter of it for equations that are compiled without LLVM's passes (`is_long`).
 
     Raises
     ------
@@ -380,8 +380,8 @@ def check_size(traced: Any, lanes: bool = False) -> None:
     """
     expanded = _expanded(traced)
     loops, nodes = loop_count(expanded), len(ordered(expanded))
-    minutes = max(loops / LIMITS.operations, nodes / LIMITS.nodes)
-    minutes *= 0.25 if is_long(traced) and not lanes else minutes
+    size = max(loops / LIMITS.operations, nodes / LIMITS.nodes)
+    minutes = 0.25 * size if is_long(traced) and not lanes else size**2
     minutes *= (LIMITS.derivatives if traced.columns else 1.0) * (LIMITS.lanes if lanes else 1.0)
     most = LIMITS.compiling if traced.columns or lanes else 1.0
     if minutes > most:
