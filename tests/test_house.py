@@ -389,6 +389,9 @@ LONGEST = {
     "erosion.py",
     "ten_masses.py",
     "soft_stop.py",
+    "beam_on_stop.py",
+    "identification.py",
+    "overturning_spectrum.py",
 }  # seconds each; the gallery of `make docs` runs all of them
 
 

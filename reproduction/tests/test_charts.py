@@ -49,6 +49,7 @@ def test_the_data_say_what_they_are_and_claims_follow_from_disk_too(tmp_path):
     assert clipped(figure.draw(stored)) == []
 
 
+@pytest.mark.thorough
 def test_its_page_has_every_chart_with_all_its_cells(tmp_path):
     system, charts, first = FIGURES["fig14"].page(data())
     file = saltus.page(system, *charts, path=tmp_path / "fig14.html", **first)

@@ -81,6 +81,7 @@ def test_erratum_24_past_the_critical_load_rest_is_left_and_taken_up_again_in_ev
     assert excursion.y[0, -1] < 0.0
 
 
+@pytest.mark.thorough
 def test_erratum_30_the_first_cycle_neither_grows_nor_flattens_everywhere():
     measures = {"fig11-grows": _grows(panels()), "fig11-flattens": _flattens(panels())}
     assert set(verdicts(measures).values()) == {ClaimVerdict.CORRECTED}

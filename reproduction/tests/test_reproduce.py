@@ -76,6 +76,7 @@ def test_twice_the_speed_is_half_the_time():
     assert on_the_clock(42.0 * available_cores()) == "40 s"
 
 
+@pytest.mark.thorough
 def test_a_draft_is_marked_and_made_anew_in_full(tmp_path, monkeypatch):
     monkeypatch.setitem(FIGURES, "fig04", replace(FIGURES["fig04"], quick={"samples": 300}))
     assert reproduce(["fig04"], tmp_path, effort="quick")[0].made

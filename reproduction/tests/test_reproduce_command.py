@@ -72,6 +72,7 @@ def test_the_report_is_renewed_and_a_missing_browser_told(saltus, monkeypatch, t
     assert (tmp_path / "report.html").exists()
 
 
+@pytest.mark.thorough
 def test_an_interrupt_leaves_whole_files_only(started, tmp_path):
     command = [sys.executable, "-m", "saltus", "reproduce", "fig04", "fig05", "-o", tmp_path]
     process = started(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)

@@ -45,12 +45,16 @@ def settled(frequency, sharpness, state, periods=60):
     return float(abs(run.y[0][late]).max())
 
 
-@pytest.mark.parametrize(("frequency", "sharpness"), [(0.275, 50.0), (0.6, 50.0), (0.6, 200.0)])
+@pytest.mark.parametrize(
+    ("frequency", "sharpness"),
+    [(0.6, 50.0), *(pytest.param(*each, marks=pytest.mark.thorough) for each in [(0.275, 50.0), (0.6, 200.0)])],
+)
 def test_smoothed_branches_are_those_of_an_independent_integrator(frequency, sharpness):
     (orbit,) = (orbit for orbit in smoothed(sharpness).at(frequency) if orbit.stable)
     assert settled(frequency, sharpness, tuple(map(float, orbit.state))) == pytest.approx(orbit.amplitude, abs=2e-3)
 
 
+@pytest.mark.thorough
 def test_a_sharp_smoothing_leaves_the_hump_of_a_blunt_one_as_the_exact_motion_does():
     (orbit,) = (orbit for orbit in smoothed(50.0).at(0.28) if orbit.stable)
     sharp = settled(0.28, 20000.0, tuple(map(float, orbit.state)))

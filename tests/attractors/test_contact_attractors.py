@@ -18,6 +18,7 @@ def both_and_reduced(H, **numbers):
     return [System(model=model, load=load, impact=VelocityReduction(1.0)) for model in models]
 
 
+@pytest.mark.thorough
 def test_where_the_closed_layer_stays_closed_the_attractors_are_those_of_the_reduced_model():
     """H = 0.1 keeps the closed layer closed (contacts.md); at 0.2 it opens, and the steady amplitude is 0.5694, not 0.5856."""
     both, reduced = (find_attractors(system, starts=24) for system in both_and_reduced(0.1))

@@ -29,6 +29,7 @@ def states_of(system, count):
     return find_recurrence(system, begin, 60, kept=1, stop_early=False).last
 
 
+@pytest.mark.thorough
 def test_neighbours_part_as_the_derivatives_say_through_impacts_that_die_away():
     """Over the same 12 periods from the same states, after the same four in which they turn to the direction that grows."""
     states, lengths = states_of(DYING, 5), np.array([DYING.load.period])

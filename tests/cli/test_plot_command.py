@@ -21,9 +21,10 @@ ASKS = {
     "basins": "[basins]\ntheta = [-1, 0, 1]\nvelocity = [0, 1]\n",
     "stability_chart": "[stability_chart]\nhorizontal = [0.1, 0.3]\nvertical = [-1.9, -0.5]\n",
 }
+LONGEST = ("bifurcation_diagram", "stability_chart")
 
 
-@pytest.mark.parametrize("kind", ASKS)
+@pytest.mark.parametrize("kind", [pytest.param(kind, marks=pytest.mark.thorough if kind in LONGEST else ()) for kind in ASKS])
 def test_every_kind_of_result_is_drawn_again_as_it_was(kind, saltus, tmp_path):
     system = FORCED if kind != "phase_portrait" else MODEL + "[load]\nvertical = -0.5\n"
     (tmp_path / "study.toml").write_text(system + ASKS[kind])

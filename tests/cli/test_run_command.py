@@ -252,7 +252,9 @@ def test_an_interrupted_chart_goes_on_where_it_was(started, saltus, study, tmp_p
     np.testing.assert_array_equal(open_store(store)["amplitude"], whole["amplitude"])
 
 
-@pytest.mark.parametrize("asks", ["[attractors]\nstarts = 1000000\n", "[phase_portrait]\nduration = 1e5\n"])
+@pytest.mark.parametrize(
+    "asks", ["[attractors]\nstarts = 1000000\n", pytest.param("[phase_portrait]\nduration = 1e5\n", marks=pytest.mark.thorough)]
+)
 def test_an_interrupt_leaves_nothing_half_written(started, study, tmp_path, asks):
     text = CONSTANT if "portrait" in asks else FORCED
     command = [sys.executable, "-m", "saltus", "run", study(text + asks), "-o", tmp_path / "out"]
@@ -266,6 +268,7 @@ def test_an_interrupt_leaves_nothing_half_written(started, study, tmp_path, asks
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.thorough
 def test_an_interrupted_diagram_leaves_a_store_to_go_on_with(started, study, tmp_path):
     command = [
         sys.executable,

@@ -73,7 +73,9 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.thorough if name.startswith("releases") else ()) for name in CASES]
+)
 def test_derivatives_are_the_limit_of_central_differences_of_second_order(name):
     system, x, v, duration, kinds = CASES[name]
     paths = PATHS if system.impact.e[0] else PATHS[:3] + PATHS[5:]
@@ -88,6 +90,7 @@ def test_derivatives_are_the_limit_of_central_differences_of_second_order(name):
     assert near < far / 10, (far, near)  # 25, but for rounding
 
 
+@pytest.mark.thorough
 def test_where_the_other_layer_stays_closed_they_are_those_of_the_reduced_model():
     full = layers(transfer=0.95, H=0.1, damping=0.1, mass_ratio=0.0)
     reduced = System(model=Metainterface(beta0=BETA80, damping=0.1), load=full.load, impact=VelocityReduction(0.95))

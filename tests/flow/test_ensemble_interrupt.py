@@ -40,7 +40,7 @@ else:
     [
         (200_000, 10_000, "dict()"),
         (16, 10**9, "dict()"),  # one chunk that never ends
-        (16, 10**9, "dict(threads=1, progress=lambda fraction, what: None)"),
+        pytest.param(16, 10**9, "dict(threads=1, progress=lambda fraction, what: None)", marks=pytest.mark.thorough),
     ],
 )
 def test_ctrl_c_ends_an_ensemble_at_once(n, periods, options):

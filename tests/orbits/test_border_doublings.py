@@ -60,8 +60,8 @@ def in_small_steps() -> list[tuple[str, float]]:
     return listed(branch)
 
 
-# The others take seconds each.
-@pytest.mark.parametrize("frequency", [*(pytest.param(x, marks=pytest.mark.thorough) for x in (0.5984, 0.599)), 0.6])
+@pytest.mark.thorough
+@pytest.mark.parametrize("frequency", [0.5984, 0.599, 0.6])
 def test_from_wherever_it_is_begun_a_branch_has_the_special_points_of_small_steps(
     frequency: float, in_small_steps: list[tuple[str, float]]
 ) -> None:

@@ -80,6 +80,7 @@ def test_rounding_makes_no_special_points_along_their_branch(in_step: saltus.Per
     assert same_orbit(branch.at(1.0)[0], in_step)
 
 
+@pytest.mark.thorough
 def test_the_order_of_events_in_cells_that_do_not_act_on_one_another_makes_no_special_points(chain: saltus.System) -> None:
     """Below the frequency 0.993 the cells part: the impacts of one come before or after those of another."""
     system = chain.with_({"load.frequency": 0.97})
@@ -91,6 +92,7 @@ def test_the_order_of_events_in_cells_that_do_not_act_on_one_another_makes_no_sp
     assert [str(end) for end in branch.ends] == ["bound 0.96", "bound 0.98"]
 
 
+@pytest.mark.thorough
 def test_maps_of_motions_one_by_one_are_those_of_lanes() -> None:
     """Near returns of systems of many coordinates are improved one by one."""
     system, rng = cells(saltus.TwoLayer), np.random.default_rng(0)

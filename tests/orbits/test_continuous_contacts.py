@@ -16,7 +16,9 @@ CASES = {
     "spring and damper": ({"damper": 0.3, "amplitude": 0.6}, (0.2, 3.0)),
     "softer beyond": ({"stop": -0.6, "amplitude": 0.4}, (0.5, 2.0)),
 }
-every_case = pytest.mark.parametrize("name", CASES)
+every_case = pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.thorough if name == "spring" else ()) for name in CASES]
+)
 
 
 @cache

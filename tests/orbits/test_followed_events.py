@@ -212,6 +212,7 @@ def test_beyond_where_impacts_die_away_they_are_lost_one_by_one_at_distances_tha
     assert np.abs(folds[1:8] / folds[:7] - 2.0).max() < 0.02
 
 
+@pytest.mark.thorough
 def test_along_both_layers_releases_appear(layers: saltus.Branch) -> None:
     """Direct motions beside each point differ."""
     assert kinds_of(layers) == ["SW", "SW", "RL", "CH"]

@@ -144,6 +144,7 @@ def test_both_layers_have_orbits_whose_impacts_die_away() -> None:
     assert (np.sort(np.abs(orbit.multipliers))[:2] < 1e-12).all()
 
 
+@pytest.mark.thorough
 def test_a_period_doubling_where_impacts_die_away_lies_on_its_curve() -> None:
     """Of both layers with e = 0.5: a branch under another vertical load, of orbits found there, has it where the curve is."""
     amplitude = "load.horizontal.amplitude"

@@ -48,6 +48,7 @@ def test_the_band_that_the_paper_calls_quasi_periodic_is_chaotic(quasi_periodic_
     assert widest.exponent == pytest.approx(0.03, abs=0.012)
 
 
+@pytest.mark.thorough
 def test_a_cascade_of_long_periods_is_followed_to_its_chaos_beside_another_attractor():
     """Fig. 10a's orbit of period 16 doubles at Omega = 3.8024; four of five random motions settle on period 1 everywhere here."""
     system, bounds = under(ground_horizontal=Harmonic(amplitude=0.25), vertical=-0.5), (3.798, 3.814)
@@ -139,6 +140,7 @@ def test_there_is_no_chaos_in_a_linear_oscillator():
     assert (found.tried.verdict == Ending.PERIODIC).all()
 
 
+@pytest.mark.thorough
 def test_transients_of_chaos_at_high_frequency_make_no_band():
     """numerics.md and the issue: Omega = 4, Hhat between 7.2 and 7.3."""
     found = bands(forced(7.2, 4.0), AMPLITUDE, (7.2, 7.3), count=3, settings=replace(COARSE, step=0.1, fine_step=0.1))

@@ -321,6 +321,7 @@ def test_the_quasi_static_border_is_there_only_where_its_closed_form_holds(chang
     assert {"chart", "borders", "disagreements"} <= set(tree.children)
 
 
+@pytest.mark.thorough
 def test_motions_that_rest_in_each_period_are_followed_too():
     """Impacts with loss: the motions are held for a part of each period, and end all the same."""
     system = System(model=forced(1.0).model, load=forced(1.0).load, impact=VelocityReduction(0.6))

@@ -20,6 +20,7 @@ from saltus.studies.diagram.simulated import simulate_from
 AMPLITUDE = "load.horizontal.amplitude"
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("frequency", "low", "high"), [(0.5, 0.08, 0.18), pytest.param(0.75, 0.08, 0.12, marks=pytest.mark.thorough)]
 )

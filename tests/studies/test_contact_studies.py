@@ -52,6 +52,7 @@ def stops(e=0.7):
     )
 
 
+@pytest.mark.thorough
 def test_a_spectrum_of_both_layers_is_the_reduced_one_where_the_closed_layer_stays_closed():
     """H = 0.1 and frequencies about 1: the same stable branch, to 1e-8 in amplitude, and nothing left that is not on it."""
     few = {"values": [0.95, 1.0, 1.05], "starts": 6, "max_period": 1, "effort": "quick", "repelling": 0, "switch": False}

@@ -112,7 +112,7 @@ except KeyboardInterrupt:
 """
 
 
-@pytest.mark.parametrize("when", ["searching", "following"])
+@pytest.mark.parametrize("when", ["searching", pytest.param("following", marks=pytest.mark.thorough)])
 def test_ctrl_c_leaves_nothing_half_written(when, tmp_path):
     program = PROGRAM.format(
         tests=[str(Path(__file__).parent), str(Path(__file__).parents[1])], when=when, path=str(tmp_path / "spectrum.nc")

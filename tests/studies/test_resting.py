@@ -49,6 +49,7 @@ def test_a_family_that_rests_is_confirmed_over_its_whole_period():
     assert data["residual"].max() < 1e-10
 
 
+@pytest.mark.thorough
 def test_a_diagram_has_the_family_that_rests_and_the_one_that_does_not():
     tree = bifurcation_diagram(SLOW, AMPLITUDE, (0.05, 0.5), max_period=2, values=[0.07, 0.15, 0.45], starts=8)
     assert tree["search"]["at_rest"].values.tolist() == [8, 0, 0]  # only below Hcr = 0.088

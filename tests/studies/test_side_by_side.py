@@ -138,10 +138,10 @@ def test_an_error_of_one_computation_ends_the_others_at_their_next_report(cores)
         all_at_once([endless, fail, endless])
 
 
-LATE = [pytest.param(when, marks=pytest.mark.thorough) for when in ("looking for chaos, confirming", "estimating")]
+LATE = [pytest.param(when, marks=pytest.mark.thorough) for when in ("following", "looking for chaos, confirming", "estimating")]
 
 
-@pytest.mark.parametrize("when", ["following", "looking for chaos, values", *LATE])
+@pytest.mark.parametrize("when", ["looking for chaos, values", *LATE])
 def test_an_interrupted_diagram_ends_at_once(cores, when):
     """The threads are gone when the interrupt arrives where the diagram was asked for."""
 

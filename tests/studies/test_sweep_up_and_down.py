@@ -126,6 +126,7 @@ def test_a_start_beyond_the_contact_is_refused_as_by_simulate(place):
         saltus.classify(oscillator(), x=place)
 
 
+@pytest.mark.thorough
 def test_a_slow_sweep_follows_the_response_within_its_rate():
     grid = np.linspace(1.3, 1.6, 601)
     data = saltus.frequency_sweep(oscillator(1.3, wall=50.0), grid, periods=1, stop_early=False, x=0.0)

@@ -158,6 +158,7 @@ def test_arrays_whose_codecs_could_run_code_are_refused_before_zarr_reads_them(s
             question(store)
 
 
+@pytest.mark.thorough
 def test_hundreds_of_thousands_of_chunks_that_are_not_there_are_counted_at_once(tmp_path):
     """Once each was asked of the disk alone, and each was looked for in every row: an hour."""
     axes = {"x": np.arange(3e5), "y": np.arange(1.0)}
