@@ -58,6 +58,19 @@ def test_they_end_on_the_orbit_of_one_cell_whose_multipliers_are_among_theirs(in
     assert np.abs(in_step.multipliers).max() > np.abs(one.multipliers).max() + 0.1  # cells that part come together slowly
 
 
+def test_multipliers_of_cells_that_close_alike_are_those_of_their_motion() -> None:
+    """Without restitution each cell closes one layer and opens the other: both belong to the event of their own cell."""
+    load = saltus.Load(frequency=1.0, vertical=-0.5, horizontal=saltus.Harmonic(amplitude=0.15))
+    model = saltus.CellChain(beta0=BETA80, cells=2, coupling=0.5, damping=0.1)
+    system = saltus.System(model=model, load=load, impact=saltus.NewtonImpact(e=0.0))
+    orbit = saltus.find_orbit(system, lower_1=0.4, upper_1=0.0, lower_2=0.4, upper_2=0.0, velocity=(0.0,) * 4)
+    assert [event.closed for event in orbit.signature.events] == [9, 5, 6, 10]  # upper_1 opens, then upper_2, and so on
+    state = saltus.sensitivities(system, **orbit.start(), periods=1, tol=1e-12).state
+    expected, found = np.linalg.eigvals(state), orbit.multipliers
+    for multiplier in expected[np.abs(expected) > 0.01]:
+        assert np.abs(found - multiplier).min() < 1e-7
+
+
 def test_multipliers_are_the_rate_at_which_a_motion_beside_it_comes_back(in_step: saltus.PeriodicOrbit) -> None:
     """The first and the last cell pushed apart: the slowest motion against each other has the largest multiplier."""
     largest = np.abs(in_step.multipliers).max()

@@ -236,15 +236,17 @@ def _mode_changes(motion: Motion, together: float) -> list[tuple[float, ModeChan
     MotionError
         There are events for which orbits have no equations.
     """
+    contacts, last = motion.system.contact_model.contacts, motion.start
     changes: list[tuple[float, ModeChange]] = []
     for time, acting in _instants(motion, together):
-        closed = int(motion.closed_at(time))
-        for contact, is_impact in acting.items():  # before the first of these events all their contacts are as they were
-            closed = closed & ~(1 << contact) if is_impact else closed | 1 << contact
-        after = int(motion.closed_at(time))
-        for contact, is_impact in acting.items():
-            closed = closed & ~(1 << contact) | after & 1 << contact
-            changes.append((time, ModeChange(is_impact, contact, closed)))
+        before, closed = int(motion.closed_at(0.5 * (last + time))), int(motion.closed_at(time))
+        here = list[tuple[float, ModeChange]]()
+        for contact, is_impact in reversed(acting.items()):  # before its event all contacts of a group are as they were
+            here.append((time, ModeChange(is_impact, contact, closed)))
+            group = sum(1 << i for i, other in enumerate(contacts) if other.group == contacts[contact].group)
+            closed = closed & ~group | before & group
+        changes += reversed(here)
+        last = time
     return changes
 
 
