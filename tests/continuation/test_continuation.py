@@ -235,6 +235,22 @@ def test_a_zero_is_located_from_the_side_on_which_the_function_is_a_power(power)
     assert len(asked) < 26  # bisection to this width takes 40
 
 
+def test_a_zero_is_located_to_rounding_where_rounding_moves_the_points_beside_it():
+    """The last brackets are narrower than what rounding leaves of the unknowns: a point that lies off by this is on the curve."""
+
+    def rounded(place: np.ndarray) -> float:
+        return float(place[1] + 6e-14 * (int(place[0] * 2.0**53) // 2 % 2))
+
+    line = Explicit(rounded, lambda place: np.array([0.0, 1.0]))
+    begin, end = (line.solve(np.array([x, 0.0]), np.array([1.0, 0.0])) for x in (0.0, 1.0))
+    for zero in np.linspace(0.1, 0.9, 57).tolist():
+        found = located(
+            Function("zero", lambda point, at=zero: math.expm1(2.0 * (float(point.place[0]) - at)), 1e-15), begin, end
+        )
+        assert found is not None
+        assert abs(found.point.place[0] - zero) < 1e-14
+
+
 def test_a_corrector_that_goes_round_at_a_kink_is_given_up():
     """Newton's method jumps to and fro between both branches of 1 + abs(x), which has no zero, until it is told not to."""
     asked = []

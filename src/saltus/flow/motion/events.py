@@ -238,18 +238,13 @@ def masks_of(names: Sequence[str]) -> dict[str, Any]:
     return {"flag_masks": masks, "flag_meanings": " ".join(names)}
 
 
-def modes_of(model: Model, side: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Closed contacts as bits, and the direction in which each friction slides, from the numbers `side` of motions: +1 or -1, 0
-    where it sticks, 2 where its contact is open."""
+def modes_of(model: Model, side: np.ndarray) -> tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]:
+    """Closed contacts as bits, the direction in which each friction slides, and the side of each surface, +1 or -1, from the
+    numbers `side` of motions. A friction slides to +1 or -1; 0 where it sticks, 2 where its contact is open."""
     count, number = len(model.contacts), np.asarray(side).astype(np.int64) - 1
-    slides = [(number >> (count + 2 * k) & 3) - 1 for k in range(len(model.frictions))]
-    return number & np.int64((1 << count) - 1 if count < 64 else -1), slides
-
-
-def sides_of(model: Model, side: np.ndarray) -> list[np.ndarray]:
-    """The side of each surface, +1 or -1, from the numbers `side` of motions."""
-    first, number = len(model.contacts) + 2 * len(model.frictions), np.asarray(side).astype(np.int64) - 1
-    return [each.sign * ((number >> (first + 2 * k) & 3) - 1) for k, each in enumerate(model.surfaces)]
+    pairs = [(number >> (count + 2 * k) & 3) - 1 for k in range(len(model.frictions) + len(model.surfaces))]
+    beside = [each.sign * pair for each, pair in zip(model.surfaces, pairs[len(model.frictions) :], strict=True)]
+    return number & np.int64((1 << count) - 1 if count < 64 else -1), pairs[: len(model.frictions)], beside
 
 
 class Stop(StrEnum):

@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.checks import Numbers, check_count, instants
 from saltus.errors import ParameterError, near
-from saltus.flow.motion.events import EventKind, Impacts, MotionEvents, Stop, masks_of, modes_of, sides_of, type_of_bits
+from saltus.flow.motion.events import EventKind, Impacts, MotionEvents, Stop, masks_of, modes_of, type_of_bits
 from saltus.flow.motion.validity import DenseOutput, Validity, ValidityCheck
 from saltus.progress import html_table
 from saltus.result import Result, provenance, table_of
@@ -133,14 +133,14 @@ class Motion(Result):
     def sliding(self) -> dict[str, int]:
         """The direction in which each friction slides at the end, 0 where it sticks, of a model with frictions."""
         model = self.system.model
-        _, slides = modes_of(model, np.array(self.side))
+        _, slides, _ = modes_of(model, np.array(self.side))
         return {friction.name: int(s) for friction, s in zip(model.frictions, slides, strict=True)}
 
     @property
     def sides(self) -> dict[str, int]:
         """The side of each surface at the end, +1 or -1, of a model with surfaces."""
         model = self.system.model
-        return {each.name: int(s) for each, s in zip(model.surfaces, sides_of(model, np.array(self.side)), strict=True)}
+        return {each.name: int(s) for each, s in zip(model.surfaces, modes_of(model, np.array(self.side))[2], strict=True)}
 
     def closed_at(self, time: float) -> int:
         """The contacts that are closed just after a time, of a model with several: the sum of 2^i over them.
@@ -375,12 +375,12 @@ def _add_contacts(motion: Motion, dataset: xarray.Dataset, side: np.ndarray) -> 
     model, impacts = motion.system.model, motion.impacts
     names, contacts = model.coordinates, [contact.name for contact in model.contacts]
     flags = {"units": "1"} | masks_of(contacts)
-    closed, slides = modes_of(model, side)
+    closed, slides, sides = modes_of(model, side)
     for friction, direction in zip(model.frictions, slides, strict=True):
         text = f"direction in which {friction.name} slides, 0 where it sticks"
         text += ", 2 where its contact is open" * (friction.contact is not None)
         dataset[f"sliding_{friction.name}"] = ("time", direction.astype(np.int8), {"units": "1", "long_name": text})
-    for surface, beside in zip(model.surfaces, sides_of(model, side), strict=True):
+    for surface, beside in zip(model.surfaces, sides, strict=True):
         text = f"side of the surface {surface.name}"
         dataset[f"side_{surface.name}"] = ("time", beside.astype(np.int8), {"units": "1", "long_name": text})
     if not contacts:

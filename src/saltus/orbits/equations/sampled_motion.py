@@ -36,12 +36,12 @@ class Group(NamedTuple):
 
 
 class GapAlong(NamedTuple):
-    """The gap sign (q - p) of a contact along a motion."""
+    """The gap sign (q - p) of a contact, or of a surface from one of its sides, along a motion."""
 
     coordinate: int  # the place of q among the coordinates
     sign: float
     position: float  # p
-    is_open: np.ndarray  # where it is open
+    is_open: np.ndarray  # where it is open; of a surface, where the motion is on this side
 
 
 class SideModes:
@@ -189,8 +189,13 @@ class ContactModes(SideModes):
         return []
 
     def gaps(self, side: np.ndarray) -> list[GapAlong]:
-        names, pairs = self.system.model.coordinates, zip(self.system.contact_model.contacts, self.closed(side), strict=True)
-        return [GapAlong(names.index(c.coordinate), c.sign, float(c.position), ~closed) for c, closed in pairs]
+        names, known = self.system.model.coordinates, self.system.contact_model
+        found = zip(known.contacts, self.closed(side), strict=True)
+        gaps = [GapAlong(names.index(c.coordinate), c.sign, float(c.position), ~closed) for c, closed in found]
+        for surface, beside in zip(known.surfaces, modes_of(known, side)[2], strict=True):
+            place, position = names.index(surface.coordinate), float(surface.position)
+            gaps += [GapAlong(place, sign, position, beside == sign) for sign in (1.0, -1.0)]
+        return gaps
 
     def grazed(self, side: np.ndarray) -> list[GapAlong]:
         return []
@@ -304,9 +309,9 @@ class SampledMotion:
         return float(min(least))
 
     def nearest_touch(self) -> float:
-        """How near the motion comes to a further change of its mode: the least of the inner minima of the gaps of open contacts,
-        the speeds of sliding frictions, the reactions of closed contacts, and the forces that sticking frictions still lack to
-        slip.
+        """How near the motion comes to a further change of its mode: the least of the inner minima of the gaps of open contacts
+        and of the distances from surfaces, the speeds of sliding frictions, the reactions of closed contacts, and the forces
+        that sticking frictions still lack to slip.
 
         For reactions and sticking frictions the value just after an event counts too. inf without such minima.
         """

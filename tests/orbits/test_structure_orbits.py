@@ -1,0 +1,82 @@
+"""Orbits and branches of structures that are given by matrices, beside harmonic balance, closed forms and an own integration."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq, fsolve, minimize_scalar
+
+import saltus
+
+STIFFNESS = np.array([[2.0, -1.0], [-1.0, 1.0]])
+SQUARES, SHAPES = np.linalg.eigh(STIFFNESS)
+FORCE, SPRING, HARMONICS = 0.02, 0.3, 15
+WAVES = np.exp(1j * np.outer(np.arange(HARMONICS + 1), np.linspace(0.0, 2.0 * np.pi, 1024, endpoint=False)))
+
+
+def receptance(frequency):
+    """The displacement of the second mass per force on it, without the stop."""
+    of = np.asarray(frequency)[..., None]
+    return np.sum(SHAPES[1] ** 2 / (SQUARES * (1.0 + 0.05j * of) - of**2), axis=-1)
+
+
+def amplitude(frequency: float) -> float:
+    """How far the second mass moves without the stop."""
+    return float(FORCE * abs(receptance(frequency)))
+
+
+def unbalanced(unknowns, size):
+    """Harmonic balance of the second mass on a spring beyond 1, with a first harmonic of `size`; the last unknown is the
+    frequency."""
+    z, frequency = unknowns[:-1], unknowns[-1]
+    x, k = z[: HARMONICS + 1] + 1j * np.append(0.0, z[HARMONICS + 1 :]), np.arange(HARMONICS + 1)
+    second = (x @ WAVES).real
+    pressed = np.fft.rfft(SPRING * np.maximum(second - 1.0, 0.0), norm="forward")[: HARMONICS + 1]
+    error = x - receptance(frequency * k) * (FORCE * (k == 1) - np.where(k, 2, 1) * pressed)
+    return np.append(np.append(error.real, error.imag[1:]), abs(x[1]) - size)
+
+
+def balanced(size: float, near: np.ndarray) -> np.ndarray:
+    """The harmonics and the frequency at which the first harmonic has this size."""
+    found, _, success, _ = fsolve(unbalanced, near, args=(size,), xtol=1e-11, full_output=True)
+    assert success == 1
+    return found
+
+
+@pytest.fixture(scope="module")
+def soft() -> saltus.Branch:
+    stop = saltus.Surface(name="stop", coordinate=1, position=1.0, stiffness=SPRING)
+    pair = saltus.Structure(mass=np.eye(2), damping=0.05 * STIFFNESS, stiffness=STIFFNESS, surfaces=[stop], forces={"f": 1})
+    load = saltus.Load(frequency=0.5, f=saltus.Harmonic(FORCE, phase=np.pi / 2))
+    system = saltus.System(model=pair, load=load)
+    return saltus.continue_orbit(saltus.find_orbit(system, **pair.start()), "load.frequency", (0.45, 0.85))
+
+
+def test_an_orbit_is_as_far_from_a_soft_stop_as_its_amplitude_says(soft: saltus.Branch) -> None:
+    free = [point for point in soft.points if not point.orbit.motion().events]
+    assert len(free) > 20
+    for point in free[::4]:
+        assert point.evaluation.events.distance == pytest.approx(1.0 - amplitude(point.parameter), abs=1e-11)
+
+
+def test_a_branch_meets_a_soft_stop_where_the_linear_amplitude_does_and_folds_where_harmonic_balance_does(
+    soft: saltus.Branch,
+) -> None:
+    assert [str(point.kind) for point in soft.special] == ["SW", "LP", "LP", "SW"]
+    assert not soft.missed
+    assert all(str(end).startswith("bound") for end in soft.ends)
+    (meets, upper, lower, leaves) = (point.parameter for point in soft.special)
+    assert meets == pytest.approx(brentq(lambda f: amplitude(f) - 1.0, 0.60, 0.618, xtol=1e-15), abs=1e-11)
+    assert leaves == pytest.approx(brentq(lambda f: amplitude(f) - 1.0, 0.619, 0.63, xtol=1e-15), abs=1e-11)
+    linear = np.zeros(2 * HARMONICS + 2)
+    linear[-1], second = leaves, FORCE * receptance(leaves)
+    linear[1], linear[HARMONICS + 1] = second.real, second.imag
+    known = [linear]  # from the linear motion on, with a larger first harmonic: through the lower fold to the upper one
+
+    def at(size: float, sign: float) -> float:
+        known.append(balanced(size, min(known, key=lambda z: abs(np.hypot(z[1], z[HARMONICS + 1]) - size))))
+        return sign * known[-1][-1]
+
+    for fold, sign, around in ((lower, 1.0, (1.001, 1.05)), (upper, -1.0, (1.15, 1.2))):
+        for size in np.linspace(1.0, around[0], 3):
+            at(size, sign)
+        found = minimize_scalar(at, bounds=around, args=(sign,), method="bounded", options={"xatol": 1e-4})
+        assert sign * found.fun == pytest.approx(fold, abs=1e-6)
