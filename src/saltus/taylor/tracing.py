@@ -104,6 +104,11 @@ class Trace:
         return tuple(i for i in range(len(self.acceleration)) if i % self.dof >= self.dof - self.first_order)
 
     @property
+    def local(self) -> int:
+        """The number of its first coordinates on which impacts act: all, or the local ones of a structure."""
+        return self.dof if self.modes is None else self.modes.first
+
+    @property
     def several(self) -> bool:
         """Whether there are contacts or frictions that may hold its coordinates, one by one."""
         return bool(self.signs or self.friction_coordinates)
@@ -324,10 +329,7 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
     result.ground_speeds = [combine("add", w, 0.0) for w in speeds]
     places = [model.coordinates.index(part.coordinate) for part in parts]
     result.friction_coordinates = tuple(p if k < len(frictions) else -1 - p for k, p in enumerate(places))
-    zero, one, beyond = number(0.0), number(1.0), range(local, result.dof)
-    mass = mass_rows(model, q)
-    result.mass = [x for row in mass for x in (*(combine("add", entry, 0.0) for entry in row), *(zero for _ in beyond))]
-    result.mass += [one if i == j else zero for i in beyond for j in range(result.dof)]
+    result.mass = [combine("add", entry, 0.0) for row in mass_rows(model, q) for entry in row]
     result.restitution = [combine("add", entry, 0.0) for row in twin.impact.restitution_matrix(model) for entry in row]
     result.positions = [combine("add", contact.position, 0.0) for contact in contacts]
     afters = [ask(model, "after_impact", contact.name, q, v) for contact in contacts if result.first_order]
@@ -345,7 +347,8 @@ def _trace_margins(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any, side: 
     a = tuple(Expr("acceleration", (), i) for i in range(result.dof))
     margins = dict(ask(twin.model, "margins", t, q, v, a[0] if result.dof == 1 else a, side, twin.load)) if stop_at else {}
     if result.several and stop_at:
-        free, slides = ([Expr(op, (), i) for i in range(result.dof + len(result.ground_speeds))] for op in ("free", "slide"))
+        free: list[Any] = [Expr("free", (), i) for i in range(result.local)] + [1.0] * (result.dof - result.local)
+        slides = [Expr("slide", (), i) for i in range(len(result.ground_speeds))]
         margins |= friction_margins(twin.model, t, q, v, twin.load, free, slides)
     for name in stop_at:
         if name not in margins:

@@ -183,8 +183,8 @@ def is_there(motion, place):
 def block_of(motion, hit, backwards):
     """The block of the first contact in `hit`, or of the last: the contacts that the mass matrix or E couples with it, as
     bits."""
-    own, count = motion.own, motion.contacts.shape[0]
-    joined, start, grows, block = np.zeros(own, np.bool_), 0, True, 0
+    local, count = motion.local, motion.contacts.shape[0]
+    joined, start, grows, block = np.zeros(local, np.bool_), 0, True, 0
     fill_contact_matrices(motion)
     while hit >> start != 1 if backwards else not hit >> start & 1:
         start += 1
@@ -193,14 +193,14 @@ def block_of(motion, hit, backwards):
         fill_slopes(motion)
     while grows:
         grows = False
-        for a in range(own):
-            for b in range(own):
-                if joined[a] and not joined[b] and is_there(motion, own * a + b):
+        for a in range(local):
+            for b in range(local):
+                if joined[a] and not joined[b] and is_there(motion, local * a + b):
                     joined[b] = grows = True
         for i in range(count):
             for k in range(count):
                 a, b = motion.contacts[i, ContactColumn.COORDINATE], motion.contacts[k, ContactColumn.COORDINATE]
-                if joined[a] != joined[b] and is_there(motion, own * own + count * i + k):
+                if joined[a] != joined[b] and is_there(motion, local * local + count * i + k):
                     joined[a] = joined[b] = grows = True
         for k in range(motion.frictions.shape[0]):
             if motion.frictions[k, FrictionColumn.PRESSED] > 0:

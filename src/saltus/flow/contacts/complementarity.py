@@ -193,7 +193,7 @@ def push(motion, a, i):
 def fill_rubbing(motion):
     """Let impulses of frictions in contacts act along with those of the contacts in `INVERSE` and `COUPLING`: they slide on in
     their directions, or go on having the speed of the ground."""
-    own, inverse = motion.own, motion.inverse
+    local, inverse = motion.local, motion.inverse
     for k in range(motion.frictions.shape[0]):
         if motion.frictions[k, FrictionColumn.PRESSED] > 0:
             c = motion.frictions[k, FrictionColumn.COORDINATE]
@@ -202,12 +202,12 @@ def fill_rubbing(motion):
                 FrictionImpact.FORWARDS if rate > 0.0 else FrictionImpact.BACKWARDS if rate < 0.0 else FrictionImpact.STUCK
             )
             own_inverse = inverse[c, c]
-            for a in range(own if rate == 0.0 else 0):
+            for a in range(local if rate == 0.0 else 0):
                 across = inverse[a, c] / own_inverse
-                for b in range(own):
+                for b in range(local):
                     if a != c:
                         inverse[a, b] -= across * inverse[c, b]
-            for b in range(own if rate == 0.0 else 0):
+            for b in range(local if rate == 0.0 else 0):
                 inverse[c, b] = 0.0
     for i in range(motion.contacts.shape[0]):
         for j in range(motion.contacts.shape[0]):
@@ -289,8 +289,8 @@ def struck_velocities(motion, acts, after):
     velocities. False if there is no solution. The rates of these contacts become -`right`, and sticking coordinates have the
     speeds of their grounds.
     """
-    own, count, row, size = motion.own, motion.contacts.shape[0], 0, unknown_impulses(motion, acts)
-    for a in range(own):
+    local, count, row, size = motion.local, motion.contacts.shape[0], 0, unknown_impulses(motion, acts)
+    for a in range(local):
         after[a] = motion.velocities[a]
         for j in range(count):
             after[a] += push(motion, a, j) * motion.impulses[j] if motion.impulses[j] != 0.0 else 0.0
@@ -314,7 +314,7 @@ def struck_velocities(motion, acts, after):
 def add_unknown(motion, acts, after):
     """Add to velocities what the impulses that were solved for give."""
     size = unknown_impulses(motion, acts)
-    for a in range(motion.own):
+    for a in range(motion.local):
         column = 0
         for j in range(motion.contacts.shape[0]):
             if acts >> j & 1:

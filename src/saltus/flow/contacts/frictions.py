@@ -32,7 +32,7 @@ ALIKE = 1e-12
 def hold_frictions(motion):
     """Tell the model's functions, through `env`, in which direction each friction slides, and that sticking coordinates are not
     free."""
-    first = motion.parameters.size - motion.own
+    first = motion.parameters.size - motion.local
     for k in range(motion.frictions.shape[0]):
         slides = motion.frictions[k, FrictionColumn.SLIDES]
         motion.parameters[first - motion.frictions.shape[0] + k] = 1.0 * slides if slides != 2 else 0.0
@@ -315,7 +315,7 @@ def stick_columns(motion, count):
         for row in range(rows):
             b = held_by(motion, row)
             if b >= 0:
-                for a in range(own):
+                for a in range(motion.local):
                     motion.velocities[own * (1 + j) + a] += motion.inverse[a, b] * block[found, size]
                 found += 1
 
@@ -369,10 +369,10 @@ def tear_loose(motion, i):
 @lean_jit
 def all_stand(motion):
     """Whether no coordinate moves: none is free, and all sticking ones do so on ground at rest."""
-    for i in range(motion.parameters.size - motion.own, motion.parameters.size):
+    for i in range(motion.parameters.size - motion.local, motion.parameters.size):
         if motion.parameters[i] != 0.0:
             return False
-    moves = False
+    moves = motion.local < motion.own
     for k in range(motion.frictions.shape[0]):
         is_friction = motion.frictions[k, FrictionColumn.MARGIN] != NoMargin.SURFACE
         moves = moves or (is_friction and ground_speed(motion, k) != 0.0)

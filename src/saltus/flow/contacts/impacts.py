@@ -21,8 +21,8 @@ from saltus.taylor import lean_jit
 @lean_jit
 def hold_coordinates(motion):
     """Tell the model's functions, through `env`, which coordinates are free."""
-    first = motion.parameters.size - motion.own
-    for i in range(motion.own):
+    first = motion.parameters.size - motion.local
+    for i in range(motion.local):
         motion.parameters[first + i] = 1.0
     for i in range(motion.contacts.shape[0]):
         if motion.contacts[i, ContactColumn.CLOSED] == 1:
@@ -68,9 +68,9 @@ def contact_step_size(motion, t, target, size):
 def fill_contact_matrices(motion):
     """Fill `NUMBERS`, `INVERSE`, `COUPLING`, `GAPS` and `RATES` of `solver` at the present state; False if the mass matrix is
     singular."""
-    own, count, signs = motion.own, motion.contacts.shape[0], motion.signs
+    count, signs = motion.contacts.shape[0], motion.signs
     motion.matrices(motion.env, motion.piece, motion.state, motion.solver_numbers)
-    regular = invert(motion.solver_numbers, own, motion.block, motion.inverse)
+    regular = invert(motion.solver_numbers, motion.local, motion.block, motion.inverse)
     for i in range(count):
         a = motion.contacts[i, ContactColumn.COORDINATE]
         for j in range(count):
@@ -145,8 +145,8 @@ def impact_impulses(motion, chosen, rates):
 @lean_jit
 def jump_place(motion, i, k):
     """The place in `NUMBERS` of a coordinate of first order, by its number, after an impact on a contact."""
-    own, count = motion.own, motion.contacts.shape[0]
-    return own * own + count * count + count + motion.first_order * i + k
+    local, count = motion.local, motion.contacts.shape[0]
+    return local * local + count * count + count + motion.first_order * i + k
 
 
 @lean_jit
@@ -161,7 +161,7 @@ def jump_first_order(motion, hit):
 @lean_jit
 def apply_impulses(motion):
     """Add the effect of the impulses to the velocities."""
-    for i in range(motion.own):
+    for i in range(motion.local):
         for j in range(motion.contacts.shape[0]):
             gain = motion.inverse[i, motion.contacts[j, ContactColumn.COORDINATE]] * motion.signs[j]
             motion.velocities[i] += gain * motion.impulses[j]
@@ -358,7 +358,7 @@ def bring_to_rest(motion, near):
         if near >> i & 1:
             motion.impulses[i] = motion.tried[row]
             row += 1
-    for a in range(motion.own):
+    for a in range(motion.local):
         for j in range(count):
             motion.velocities[a] += push(motion, a, j) * motion.impulses[j]
     for i in range(count):

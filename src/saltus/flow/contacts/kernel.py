@@ -138,7 +138,7 @@ def decide_columns(motion, t):
     if motion.columns == 0:
         return
     if motion.leave_by == 1:
-        first = motion.parameters.size - motion.own
+        first = motion.parameters.size - motion.local
         for i in range(first, motion.parameters.size):
             motion.parameters[i] = 1.0
         start_columns(motion, t, closed_bits(motion))
@@ -387,5 +387,5 @@ def parts_of(numbers, state, env, functions, rows, buffers):
     """The memory of a motion but for its numbers as one named tuple; `rows` are those of contacts, then of frictions."""
     count, steps = functions.signs.size, step_arrays(numbers)
     contacts, frictions = rows[:count], rows[count:]
-    solver = solver_arrays(numbers.own, count, numbers.columns, frictions, numbers.first_order)
+    solver = solver_arrays(numbers.local, count, numbers.columns, frictions, numbers.first_order)
     return ContactsParts(state, env, env[0], env[2], functions, contacts, frictions, steps, solver, buffers[0], buffers[1])

@@ -22,7 +22,7 @@ from saltus.taylor.lane_vectors import absolute, bits, fma, mask, select, splat
 def write_closed(lane, contacts):
     """Tell the model's functions which coordinates of a lane are free; returns its closed contacts as bits."""
     closed = 0
-    for d in range(lane.sizes.own):
+    for d in range(lane.sizes.local):
         lane.free[d] = 1.0
     for i in range(contacts.shape[0]):
         if contacts[i, ContactColumn.CLOSED] == 1:
@@ -103,23 +103,23 @@ def resolve_impacts(lanes, hit, which):
 @lean_jit
 def give_impulses(lanes, closing):
     """Solve for the jumps of all velocities: those at the acting contacts are given, and no impulse acts on the others."""
-    own, free, jump, matrix = lanes.sizes.own, lanes.impulse_free, lanes.jump, lanes.matrix
-    for row in range(own):
+    local, free, jump, matrix = lanes.sizes.local, lanes.impulse_free, lanes.jump, lanes.matrix
+    for row in range(local):
         free[row], jump[row] = splat(1.0), splat(0.0)
     for i in range(lanes.sizes.contacts):
         row, acts = lanes.sizes.coordinates[i], mask(acting_lanes(lanes, closing, i))
         after = (1.0 * lanes.sizes.signs[i]) * aim(lanes, closing, i)
         free[row] = select(acts, splat(0.0), free[row])
         jump[row] = select(acts, after - lanes.new_velocity[row], jump[row])
-    for row in range(own):
+    for row in range(local):
         known, here = splat(0.0), free[row]
-        for column in range(own):
-            entry = lanes.mass[own * row + column]
+        for column in range(local):
+            entry = lanes.mass[local * row + column]
             known = fma(entry, jump[column] * (1.0 - free[column]), known)
             diagonal = 1.0 - here if row == column else splat(0.0)
-            matrix[own * row + column] = fma(entry, here * free[column], diagonal)
+            matrix[local * row + column] = fma(entry, here * free[column], diagonal)
         jump[row] = select(mask(bits(here > 0.5)), -known, jump[row])
-    eliminate_in_lanes(matrix, jump, own)
+    eliminate_in_lanes(matrix, jump, local)
 
 
 @lean_jit
@@ -143,13 +143,13 @@ def eliminate_in_lanes(matrix, right, size):
 @lean_jit
 def impulses_hold(lanes, closing):
     """Bits of the lanes in which the jumps solve the problem, no slow speed is left, and some coordinate is free afterwards."""
-    own, jump, good, freed = lanes.sizes.own, lanes.jump, closing.hit, splat(1.0 * lanes.sizes.own)
+    local, jump, good, freed = lanes.sizes.local, lanes.jump, closing.hit, splat(1.0 * lanes.sizes.own)
     for i in range(lanes.sizes.contacts):
         row, aimed, sign = lanes.sizes.coordinates[i], aim(lanes, closing, i), 1.0 * lanes.sizes.signs[i]
         concerned = closing_lanes(closing, i) | (closed_lanes(lanes, i) & closing.hit)
         acts, impulse = acting_lanes(lanes, closing, i), splat(0.0)
-        for column in range(own):
-            impulse = fma(lanes.mass[own * row + column], jump[column], impulse)
+        for column in range(local):
+            impulse = fma(lanes.mass[local * row + column], jump[column], impulse)
         rate = select(mask(acts), aimed, sign * jump[row])
         lanes.rates[i] = rate
         solved = (acts & bits(sign * impulse >= 0.0)) | (concerned & ~acts & bits(rate >= aimed))
@@ -164,7 +164,9 @@ def take_impulses(lanes, closing):
     """Put the state after the impact, and the closed contacts, into the lanes of `closing`."""
     chosen, side = mask(closing.hit), splat(1.0)
     for row in range(lanes.sizes.own):
-        after = lanes.new_velocity[row] + lanes.jump[row]
+        after = lanes.new_velocity[row]
+        if row < lanes.sizes.local:
+            after = after + lanes.jump[row]
         lanes.after_position[row] = select(chosen, lanes.new_position[row], lanes.after_position[row])
         lanes.after_velocity[row] = select(chosen, after, lanes.after_velocity[row])
     for i in range(lanes.sizes.contacts):  # all contacts before `free` changes: it still says which were closed
@@ -174,7 +176,7 @@ def take_impulses(lanes, closing):
         lanes.stays[i] = select(stays, splat(1.0), splat(0.0))
         row, rate = lanes.sizes.coordinates[i], (1.0 * lanes.sizes.signs[i]) * lanes.rates[i]
         lanes.after_velocity[row] = select(mask(acting_lanes(lanes, closing, i)), rate + 0.0, lanes.after_velocity[row])
-    for row in range(lanes.sizes.own):
+    for row in range(lanes.sizes.local):
         lanes.free[row] = select(chosen, splat(1.0), lanes.free[row])
     for i in range(lanes.sizes.contacts):
         row, stays = lanes.sizes.coordinates[i], mask(closing.hit & bits(lanes.stays[i] > 0.5))

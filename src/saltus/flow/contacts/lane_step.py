@@ -31,12 +31,12 @@ SMALL_GAP = 1e-9  # A gap smaller than this, when another one closes, may close 
 @lean_jit
 def begin_contact(lane, env, state):
     """Tell a lane where its contacts are; returns the mode in which a motion begins, and 1 plus the bits of closed contacts."""
-    own, count, sizes = lane.sizes.own, lane.sizes.contacts, lane.sizes
+    local, count, sizes = lane.sizes.local, lane.sizes.contacts, lane.sizes
     solved, contacts, matrices = lane.geometry[lane.index], lane.contact_rows[lane.index], lane.code.geometry
     matrices(env, lane.piece, lane.memory, solved)  # any state will do: positions depend on parameters alone
     mode = Mode.ARC
     for i in range(count):
-        coordinate, position, sign = sizes.coordinates[i], solved[own * own + count * count + i], sizes.signs[i]
+        coordinate, position, sign = sizes.coordinates[i], solved[local * local + count * count + i], sizes.signs[i]
         lane.contacts[i] = position
         gap, rate = sign * (state[coordinate] - position), sign * state[state.size // 2 + coordinate]
         contacts[i, ContactColumn.COORDINATE] = coordinate
@@ -167,7 +167,7 @@ def add_second_derivative(series, other, order):
 def one_is_free(lanes):
     """Bits of the lanes in which exactly one coordinate is free."""
     count = splat(0.0)
-    for row in range(lanes.sizes.own):
+    for row in range(lanes.sizes.local):
         count = count + lanes.free[row]
     return bits(absolute(count - 1.0) < 0.5)
 

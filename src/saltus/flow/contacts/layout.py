@@ -123,18 +123,18 @@ def rows_of_zeros(rows, columns):
 
 
 @jit
-def solver_arrays(own, count, columns, frictions, first_order):
+def solver_arrays(local, count, columns, frictions, first_order):
     """The arrays in which impacts are solved for, for so many columns of a tangent and with the rows of frictions."""
     rubs, rows = 0, count + frictions.shape[0]
     for k in range(frictions.shape[0]):
         rubs = 1 + frictions.shape[0] if frictions[k, FrictionColumn.PRESSED] > 0 else rubs
-    most = max(2 * own, rows + 1)
-    numbers = own * own + count * count + count * (1 + first_order) + rubs + frictions.shape[0]
+    most = max(2 * local, rows + 1)
+    numbers = local * local + count * count + count * (1 + first_order) + rubs + frictions.shape[0]
     return SolverArrays(
         zeros(numbers),
-        rows_of_zeros(own, own),
+        rows_of_zeros(local, local),
         rows_of_zeros(count, count),
-        rows_of_zeros(max(own, rows), most),
+        rows_of_zeros(max(local, rows), most),
         rows_of_zeros(count, count),
         zeros(count),
         zeros(count),
@@ -146,7 +146,7 @@ def solver_arrays(own, count, columns, frictions, first_order):
         zeros(count),
         zeros(count),
         zeros(columns * numbers),
-        zeros(own),
+        zeros(local),
         zeros(columns),
         rows_of_zeros(columns, count),
     )
@@ -162,15 +162,15 @@ def copy_all(given, target):
 @lean_jit
 def restitution(motion, i, j):
     """The entry E_ij of the restitution matrix."""
-    own, count = motion.own, motion.contacts.shape[0]
-    return motion.solver_numbers[own * own + count * i + j]
+    local, count = motion.local, motion.contacts.shape[0]
+    return motion.solver_numbers[local * local + count * i + j]
 
 
 @lean_jit
 def contact_position(motion, i):
     """The position of a contact."""
-    own, count = motion.own, motion.contacts.shape[0]
-    return motion.solver_numbers[own * own + count * count + i]
+    local, count = motion.local, motion.contacts.shape[0]
+    return motion.solver_numbers[local * local + count * count + i]
 
 
 @lean_jit

@@ -53,8 +53,8 @@ def rubbing_phase(motion, chosen, scale):
     All choices are tried, as in `complementary`, with speeds of the size `scale`. The velocities and `impulses` are set to those
     after it, and `STRUCK` of the frictions. Returns the contacts with z > 0 as bits, or -1 if there is no solution.
     """
-    own, count, frictions = motion.own, motion.contacts.shape[0], motion.frictions.shape[0]
-    after, found, ways, least = np.zeros(own), -1, 0, np.inf
+    local, count, frictions = motion.local, motion.contacts.shape[0], motion.frictions.shape[0]
+    after, found, ways, least = np.zeros(local), -1, 0, np.inf
     for number in range((1 << count) * 3**frictions):
         acts = number & ((1 << count) - 1)
         if acts & ~chosen or not choose_ways(motion, chosen, acts, number >> count):
@@ -70,7 +70,7 @@ def rubbing_phase(motion, chosen, scale):
     choose_ways(motion, chosen, found, ways)
     struck_velocities(motion, found, after)
     worst_violation(motion, chosen, found, after)
-    for a in range(own):
+    for a in range(local):
         motion.velocities[a] = after[a]
     for i in range(count):
         motion.impulses[i] = max(motion.tried[i], 0.0)
@@ -152,19 +152,20 @@ def rubbing_columns(motion, acts, chosen, first):
     `impulses`, of which e times `first`, those of an earlier phase, do not follow from the rates. `PULL_SLOPES` has the slopes of
     these, and then those of N.
     """
-    own, count, given, lifts = motion.own, motion.contacts.shape[0], np.zeros(motion.own), np.zeros(motion.contacts.shape[0])
+    own, local, count = motion.own, motion.local, motion.contacts.shape[0]
+    given, lifts = np.zeros(local), np.zeros(count)
     fill_slopes(motion)
     for j in range(motion.columns):
         z = motion.velocities[own * (1 + j) : own * (2 + j)]
         for i in range(count):
             lifts[i] = lift_rate(motion, j, i)
             motion.pull_slopes[j, i] *= restitution(motion, i, i)
-            motion.pull_slopes[j, i] += slope(motion, j, own * own + (count + 1) * i) * first[i]
-        for a in range(own):  # without the changes of the impulses
+            motion.pull_slopes[j, i] += slope(motion, j, local * local + (count + 1) * i) * first[i]
+        for a in range(local):  # without the changes of the impulses
             given[a] = z[a]
-            for b in range(own):
-                for c in range(own):
-                    given[a] -= motion.inverse[a, b] * slope(motion, j, own * b + c) * motion.jump[c]
+            for b in range(local):
+                for c in range(local):
+                    given[a] -= motion.inverse[a, b] * slope(motion, j, local * b + c) * motion.jump[c]
             for i in range(count):
                 given[a] += push_slope(motion, j, a, i) * motion.impulses[i] + push(motion, a, i) * motion.pull_slopes[j, i]
         row, size = 0, unknown_impulses(motion, acts)
@@ -174,7 +175,7 @@ def rubbing_columns(motion, acts, chosen, first):
                 for k in range(count):
                     if chosen >> k & 1:
                         change += restitution(motion, i, k) * lifts[k]
-                        change += slope(motion, j, own * own + count * i + k) * motion.gaps[k]
+                        change += slope(motion, j, local * local + count * i + k) * motion.gaps[k]
                 fill_sticking(motion, row, a, acts, -motion.signs[i] * change - given[a])
                 row += 1
         for k in range(motion.frictions.shape[0]):
@@ -192,7 +193,7 @@ def rubbing_columns(motion, acts, chosen, first):
             if acts >> i & 1:
                 motion.pull_slopes[j, i] += motion.block[row, size]
                 row += 1
-        for a in range(own):
+        for a in range(local):
             z[a] = given[a]
 
 
@@ -209,13 +210,13 @@ def push_slope(motion, j, a, i):
 @lean_jit
 def rest_columns(motion, near):
     """The columns at the end of an accumulation, where impulses on the contacts in `near` alone take their speeds."""
-    own = motion.own
-    for a in range(own):
+    local = motion.local
+    for a in range(local):
         motion.jump[a] = 0.0
         for i in range(motion.contacts.shape[0]):
             motion.jump[a] += push(motion, a, i) * motion.impulses[i]
     if is_pressed(motion):
-        invert(motion.solver_numbers, own, motion.block, motion.inverse)
+        invert(motion.solver_numbers, local, motion.block, motion.inverse)
         for j in range(motion.columns):
             for i in range(motion.contacts.shape[0]):
                 motion.pull_slopes[j, i] = 0.0
@@ -228,9 +229,8 @@ def rest_columns(motion, near):
 @lean_jit
 def free_pulls(motion, t):
     """Fill the second derivatives of the gaps with all contacts open; returns 1 plus their largest relative rate of change."""
-    own, change = motion.own, 0.0
-    first = motion.parameters.size - own
-    for i in range(own):
+    change, first = 0.0, motion.parameters.size - motion.local
+    for i in range(motion.local):
         motion.parameters[first + i] = 1.0
     expand(motion, t, 1.0, 2)
     for i in range(motion.contacts.shape[0]):
@@ -258,7 +258,7 @@ def rubbed_accumulation(motion, t, near, i, limit):
     -1 if it does not lose it within `limit`, or others in `near` take part.
     """
     u, k = motion.rates[i], rubs_along(motion, i) - 1
-    coordinate, place = motion.contacts[i, ContactColumn.COORDINATE], motion.parameters.size - motion.own
+    coordinate, place = motion.contacts[i, ContactColumn.COORDINATE], motion.parameters.size - motion.local
     place += k - motion.frictions.shape[0]
     motion.parameters[place] = motion.signs[i]
     expand(motion, t, 1.0, 0)

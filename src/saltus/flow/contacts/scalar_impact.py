@@ -35,7 +35,7 @@ def contacts_impact(lane, hit):
     """
     (array, state, contacts, solver), own, env = lane.impact_space, lane.sizes.own, own_env(lane)
     numbers, rates, speed = array[0], solver.rates, np.inf
-    numbers.dof, numbers.own, numbers.piece = own, own, lane.piece
+    numbers.dof, numbers.own, numbers.local, numbers.piece = own, own, lane.sizes.local, lane.piece
     numbers.first_order = lane.sizes.first_order
     parts = LaneImpactParts(state_arrays(numbers, state), env, env[0], functions_of(lane), contacts, solver)
     motion = by_reference(MotionMemory(numbers, parts))

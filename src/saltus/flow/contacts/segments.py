@@ -112,7 +112,7 @@ def given_impact(motion, hit, after):
     Returns False if the impact law has no solution, or if the impact opens one of the contacts in `after`, which are to be
     closed.
     """
-    own, count, unit = motion.own, motion.contacts.shape[0], motion.falling_rates
+    count, unit = motion.contacts.shape[0], motion.falling_rates
     fill_contact_matrices(motion)
     chosen = 1 << hit
     for i in range(count):
@@ -139,7 +139,7 @@ def given_impact(motion, hit, after):
                 if chosen >> k & 1:
                     rate -= restitution(motion, i, k) * motion.gaps[k]
             motion.velocities[place] = motion.signs[i] * rate + 0.0
-    for a in range(own):  # the jump of the velocities
+    for a in range(motion.local):  # the jump of the velocities
         motion.jump[a] = motion.velocities[a] - motion.jump[a]
     impulse_columns(motion, acts, chosen)
     return True
@@ -311,7 +311,7 @@ def follow_contact_segments(numbers, env, functions, contacts, request, results)
     """
     record, count = numbers[0], contacts.shape[0]
     state = state_arrays(record, np.zeros(2 * record.dof + record.columns))
-    solver = solver_arrays(record.own, count, record.columns, contacts[:0], record.first_order)
+    solver = solver_arrays(record.local, count, record.columns, contacts[:0], record.first_order)
     parts = ContactsSegmentParts(
         state, env, env[0], functions, contacts, step_arrays(record), solver, np.zeros(record.order + 2), np.zeros(2)
     )

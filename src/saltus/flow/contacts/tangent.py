@@ -61,7 +61,7 @@ def slope(motion, j, place):
 def gap_derivative(motion, j, i):
     """The derivative of a contact's gap along column j."""
     own, count, coordinate = motion.own, motion.contacts.shape[0], motion.contacts[i, ContactColumn.COORDINATE]
-    moved = slope(motion, j, own * own + count * count + i)
+    moved = slope(motion, j, motion.local * motion.local + count * count + i)
     return motion.signs[i] * (motion.coordinates[own * (1 + j) + coordinate] - moved)
 
 
@@ -93,7 +93,7 @@ def hold_columns(motion, chosen):
         for i in range(count):
             if chosen >> i & 1:
                 place = own * (1 + j) + motion.contacts[i, ContactColumn.COORDINATE]
-                motion.coordinates[place] = slope(motion, j, own * own + count * count + i)
+                motion.coordinates[place] = slope(motion, j, motion.local * motion.local + count * count + i)
                 if motion.contacts[i, ContactColumn.CLOSED] == 1:
                     motion.velocities[place] = 0.0
 
@@ -159,23 +159,23 @@ def impulse_columns(motion, acts, chosen):
 
     `solver` holds the coupling, the inverse of M, the rates before the impact (in `GAPS`) and w (in `JUMP`).
     """
-    own, count, signs = motion.own, motion.contacts.shape[0], motion.signs
-    inverse, twist, right = motion.inverse, np.zeros(own), motion.right
+    own, local, count, signs = motion.own, motion.local, motion.contacts.shape[0], motion.signs
+    inverse, twist, right = motion.inverse, np.zeros(local), motion.right
     fill_slopes(motion)
     for j in range(motion.columns):
-        for a in range(own):  # M^-1 dM w
+        for a in range(local):  # M^-1 dM w
             twist[a] = 0.0
-            for b in range(own):
-                for c in range(own):
-                    twist[a] += inverse[a, b] * slope(motion, j, own * b + c) * motion.jump[c]
+            for b in range(local):
+                for c in range(local):
+                    twist[a] += inverse[a, b] * slope(motion, j, local * b + c) * motion.jump[c]
         for i in range(count):
             right[i] = lift_rate(motion, j, i) - signs[i] * twist[motion.contacts[i, ContactColumn.COORDINATE]]
             for k in range(count):
                 if chosen >> k & 1:
                     right[i] += restitution(motion, i, k) * lift_rate(motion, j, k)
-                    right[i] += slope(motion, j, own * own + count * i + k) * motion.gaps[k]
+                    right[i] += slope(motion, j, local * local + count * i + k) * motion.gaps[k]
         acting(motion.coupling, right, count, acts, motion.block, motion.tried)
-        for a in range(own):
+        for a in range(local):
             place = own * (1 + j) + a
             motion.velocities[place] -= twist[a]
             for i in range(count):
@@ -186,7 +186,7 @@ def impulse_columns(motion, acts, chosen):
 def note_velocities(motion, before):
     """Put the velocities plus `before` times the present `JUMP` into `JUMP`: with 0 the velocities before an impact, then, with
     -1, their jump."""
-    for a in range(motion.own):
+    for a in range(motion.local):
         velocity = motion.velocities[a]
         motion.jump[a] = velocity if before == 0.0 else velocity + before * motion.jump[a]
 
@@ -220,7 +220,7 @@ def pull_slopes(motion, t):
 def perturb(motion, j, step):
     """Move all quantities on which the duration of an accumulation depends by a step along column j; gaps and rates that are 0
     stay 0."""
-    own, count, signs = motion.own, motion.contacts.shape[0], motion.signs
+    local, count, signs = motion.local, motion.contacts.shape[0], motion.signs
     numbers = motion.solver_numbers
     for i in range(count):
         if motion.gaps[i] != 0.0:
@@ -228,9 +228,9 @@ def perturb(motion, j, step):
         if motion.rates[i] != 0.0:
             motion.rates[i] += step * lift_rate(motion, j, i)
         motion.pulls[i] += step * motion.pull_slopes[j, i]
-    for k in range(own * own + count * count):
+    for k in range(local * local + count * count):
         numbers[k] += step * slope(motion, j, k)
-    invert(numbers, own, motion.block, motion.inverse)
+    invert(numbers, local, motion.block, motion.inverse)
     for i in range(count):
         for k in range(count):
             entry = motion.inverse[motion.contacts[i, ContactColumn.COORDINATE], motion.contacts[k, ContactColumn.COORDINATE]]
@@ -243,7 +243,7 @@ def perturb(motion, j, step):
 def accumulation_shifts(motion, near, t):
     """Add to `EVENT_SHIFTS`, which hold the shifts of the last impact, those of the time left until the accumulation ends:
     central differences of this time over the gaps, rates, accelerations and numbers."""
-    own, count = motion.own, motion.contacts.shape[0]
+    local, count = motion.local, motion.contacts.shape[0]
     fill_slopes(motion)
     pull_slopes(motion, t)
     gaps, rates, pulls = motion.gaps.copy(), motion.rates.copy(), motion.pulls.copy()
@@ -257,7 +257,7 @@ def accumulation_shifts(motion, near, t):
                     largest = max(largest, abs(lift_rate(motion, j, i) / rates[i]))
                 if gaps[i] != 0.0:
                     largest = max(largest, abs(gap_derivative(motion, j, i) / gaps[i]))
-        for k in range(own * own + count * count):
+        for k in range(local * local + count * count):
             largest = max(largest, abs(slope(motion, j, k)))
         change, step = 0.0, RELATIVE_STEP / max(largest, 1e-300)
         for sign in (1.0, -1.0):
@@ -275,9 +275,9 @@ def accumulation_shifts(motion, near, t):
 @lean_jit
 def project(motion, closed, vector):
     """Add M^-1 S z to a vector, with the z for which the gaps in `closed` change by -`right`."""
-    own, count = motion.own, motion.contacts.shape[0]
+    count = motion.contacts.shape[0]
     acting(motion.coupling, motion.right, count, closed, motion.block, motion.tried)
-    for a in range(own):
+    for a in range(motion.local):
         for i in range(count):
             vector[a] += push(motion, a, i) * motion.tried[i]
 
@@ -285,7 +285,7 @@ def project(motion, closed, vector):
 @jit
 def fall_back(motion, t, closed, j):
     """Column j for a start at closed contacts, see `start_columns`."""
-    own, count, right = motion.own, motion.contacts.shape[0], motion.right
+    own, local, count, right = motion.own, motion.local, motion.contacts.shape[0], motion.right
     u, z = motion.coordinates[own * (1 + j) : own * (2 + j)], motion.velocities[own * (1 + j) : own * (2 + j)]
     given, rates = u.copy(), z.copy()
     for i in range(count):
@@ -302,10 +302,10 @@ def fall_back(motion, t, closed, j):
             lost[a] += sign * gained[own * (1 + j) + a, 0]
             u[a] = math.copysign(1.0, sign) * motion.velocities[a]
         fill_slopes(motion)
-        for a in range(own):
-            for b in range(own):
-                for c in range(own):
-                    lost[a] += sign * motion.inverse[a, b] * slope(motion, j, own * b + c) * fallen[c]
+        for a in range(local):
+            for b in range(local):
+                for c in range(local):
+                    lost[a] += sign * motion.inverse[a, b] * slope(motion, j, local * b + c) * fallen[c]
     for a in range(own):
         u[a], z[a] = after[a], rates[a] - lost[a]
         if a >= own - motion.first_order:

@@ -75,6 +75,7 @@ class Sizes(NamedTuple):
     first_order: int  # how many of the model's own coordinates, the last ones, are of first order
     own: int  # the model's own coordinates
     columns: int  # of the tangent
+    local: int  # the first of its own coordinates, on which impacts act; those behind them have mass 1
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ class CompiledStructure:
         fill_constants, fill_geometry = _load_fillers()
         fill_constants(self.tables[0], parameters, constants)
         if self.several:
-            modes = np.append(np.zeros(self.frictions), np.ones(self.sizes.own))
+            modes = np.append(np.zeros(self.frictions), np.ones(self.sizes.local))
             env = (np.append(parameters, modes), constants, *records)
             series, matrices, slopes, tangent = self.functions
             return env, ContactsFunctions(series, matrices, np.array(self.signs, dtype=float), slopes, tangent)
@@ -175,7 +176,8 @@ def load_structure(trace: Trace) -> CompiledStructure:
     one_contact, several = ("contact_series", "reset", "contact_damping"), ("matrices", "matrix_slopes")
     names = ("series", *(several if trace.several else one_contact), "tangent")
     stops, steep = len(trace.reactions) + len(trace.margins), int(is_steep(trace.acceleration))
-    sizes = Sizes(len(trace.acceleration), stops, 1, trace.side_count, steep, trace.first_order, trace.dof, trace.columns)
+    own = (trace.first_order, trace.dof, trace.columns, trace.local)
+    sizes = Sizes(len(trace.acceleration), stops, 1, trace.side_count, steep, *own)
     return CompiledStructure(
         sizes,
         max(1, len(constants(trace))),

@@ -60,10 +60,11 @@ MOTION = np.dtype(
         ("first_order", _WHOLE),  # how many of the model's own coordinates, the last ones, are of first order
         ("own", _WHOLE),  # the model's own coordinates
         ("columns", _WHOLE),  # of the tangent
+        ("local", _WHOLE),  # the first of its own coordinates, on which impacts act; those behind them have mass 1
     ]
 )
 # In the order of `Structure.sizes`.
-SIZES = ["dof", "margin_count", "workspace_rows", "sides", "checked", "first_order", "own", "columns"]
+SIZES = ["dof", "margin_count", "workspace_rows", "sides", "checked", "first_order", "own", "columns", "local"]
 
 
 def motion_record(order: int, sizes: tuple[int, ...]) -> np.ndarray:

@@ -170,6 +170,7 @@ def memory_plan(trace: Trace) -> MemoryPlan:
     return MemoryPlan(
         rows=len(trace.acceleration),
         own=trace.dof,
+        local=trace.local,
         parameters=max(0 if trace.several else 1, len(trace.parameters)),
         contacts=len(trace.signs),
         frictions=len(trace.friction_coordinates),

@@ -103,7 +103,7 @@ def scalar_state(lane):
     motion.order, motion.dense, motion.until_smooth = sizes.scalar_order, sizes.extrema, 1
     motion.dof, motion.margin_count, motion.workspace_rows = sizes.rows, sizes.margins, sizes.workspace
     motion.sides, motion.checked, motion.own, motion.columns = sizes.sides, sizes.checked, sizes.own, sizes.columns
-    motion.first_order = sizes.first_order
+    motion.first_order, motion.local = sizes.first_order, sizes.local
     motion.time, motion.chatter_speed = lane.now, lane.chatter_speed
     for row in range(2 * sizes.rows):  # in both memories velocities follow the positions
         state[row] = lane.position[row]

@@ -70,7 +70,7 @@ class Parts(NamedTuple):
     ended_position: int  # at the end of the last forcing period
     ended_velocity: int
     parameters: int
-    free: int  # with several contacts: 1 for each coordinate that no contact holds, else 0
+    free: int  # with several contacts: 1 for each local coordinate that no contact holds, else 0
     contacts: int  # the contacts' positions
     mass: int  # the mass matrix at the new state, by rows
     restitution: int  # E by rows
@@ -98,6 +98,7 @@ class MemoryPlan:
 
     rows: int  # coordinates, those of the sensitivities included
     own: int  # the model's own coordinates
+    local: int  # the first of these, on which impacts act
     parameters: int
     contacts: int  # of a model with several
     frictions: int
@@ -110,7 +111,7 @@ class MemoryPlan:
     @cached_property
     def places(self) -> Parts:
         """The first slot of each part."""
-        several, contacts = self.own if self.contacts or self.frictions else 0, self.contacts
+        several, contacts = self.local if self.contacts or self.frictions else 0, self.contacts
         sizes = [self.rows] * 8 + [self.parameters + self.frictions, several, contacts, several**2, contacts**2]
         sizes += [several, several, several**2, contacts, contacts]
         sizes += [self.constant_guards, self.constants, self.records * RECORD_WIDTH]
@@ -127,6 +128,7 @@ class LaneSizes(NamedTuple):
     """Numbers of a structure and of a call."""
 
     own: int  # the model's own coordinates
+    local: int  # the first of these, on which impacts act
     first_order: int  # how many of these, the last ones, are of first order
     jumps: int  # whether those jump at impacts
     rows: int  # those of the tangent's columns included

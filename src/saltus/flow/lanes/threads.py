@@ -258,7 +258,7 @@ class Lanes:
     def _impact_space(self) -> tuple[Any, ...]:
         """Room for an impact in a model with several contacts."""
         own, count, rows = self.own, len(self.program.trace.signs), self._contact_rows()
-        solver = solver_arrays(own, count, 0, rows[count:], self.program.trace.first_order)
+        solver = solver_arrays(self.plan.local, count, 0, rows[count:], self.program.trace.first_order)
         return np.zeros(1, dtype=MOTION), np.zeros(2 * own), rows[:count], solver
 
     def _contact_rows(self) -> np.ndarray:
@@ -274,6 +274,7 @@ class Lanes:
         sizes, trace, plan = self.program.structure.sizes, self.program.trace, self.plan
         return LaneSizes(
             own=sizes.own,
+            local=sizes.local,
             first_order=sizes.first_order,
             jumps=int(any(jump.op != "coordinate" for jump in trace.jumps)),
             rows=sizes.dof,

@@ -144,7 +144,7 @@ class PortableMotion:
             "several": trace.several,
             "sizes": dict(zip(SIZES, map(int, structure.sizes), strict=True)),
             "constant_count": structure.constant_count,
-            "modes": [0.0] * structure.frictions + [1.0] * (structure.sizes.own if trace.several else 0),
+            "modes": [0.0] * structure.frictions + [1.0] * (structure.sizes.local if trace.several else 0),
             "signs": list(trace.signs),
             "contact_coordinates": list(trace.contact_coordinates),
             "friction_coordinates": list(trace.friction_coordinates),
