@@ -22,6 +22,7 @@ from peers import MODULES, PROTOTYPE, Peer, firsts, load_peers
 from plot import draw
 from report import report
 from siconos import beside_siconos
+from structures import beside_structures
 from tasks.derivatives import derivative_cost
 from tasks.fitting import fits
 from tasks.one_motion import one_motion
@@ -100,9 +101,10 @@ def main() -> None:
     write_text(folder / "benchmarks.json", json.dumps(results, indent=1) + "\n")
     write_bytes(folder / "benchmarks.png", draw(results))
     print(write_text(folder / "benchmarks.md", report(results)).read_text())
-    if set(chosen.only) == set(MODULES):  # AUTO and Siconos are peers too, and the page is beside none, in files of their own
+    if set(chosen.only) == set(MODULES):  # what is in files of its own
         beside_auto(head, chosen.quick, folder)
         beside_siconos(head, chosen.quick, folder)
+        beside_structures(head, chosen.quick, folder)
         beside_pages(head, chosen.quick, folder)
 
 

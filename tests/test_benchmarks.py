@@ -16,6 +16,9 @@ sys.path.insert(0, str(BENCHMARKS))
 equal, measure, reference, report = (__import__(name) for name in ("equal", "measure", "reference", "report"))
 from auto import case, diagram, exact, program, section, verdicts  # noqa: E402
 from peers.peer import AbsentError  # noqa: E402
+from structures.beside import at_error  # noqa: E402
+from structures.case import by_scipy  # noqa: E402
+from structures.row import bar, displaced  # noqa: E402
 from tasks import one_motion  # noqa: E402
 
 ERRORS = np.array([1e-4, 1e-6, 1e-9, 1e-13])
@@ -260,3 +263,15 @@ def test_a_fit_and_one_by_differences_have_the_same_result_and_a_line_each_in_th
     assert max(max(row["missed"], row["missed_by_differences"]) for row in rows) < NEAR
     assert report._fits(rows).count("\n| ") == 3
     assert not report._fits(None)
+
+
+def test_a_structure_is_followed_alike_by_saltus_and_by_scipy() -> None:
+    """Ten masses at a wall: ten forcing periods with their impacts and releases, which SciPy's events find."""
+    assert np.abs(by_scipy(10, 1e-7) - displaced(bar(10), 1e-10)).max() < 1e-8
+
+
+def test_what_the_smallest_steps_do_not_reach_is_extrapolated_at_first_order() -> None:
+    steps = {"rows": [{"error": 1e-3 / k, "seconds": 1.0 * k} for k in (1, 2, 4)]}
+    assert at_error(steps, 5e-4) == (pytest.approx(2.0), True)
+    assert at_error(steps, 1e-5) == (pytest.approx(100.0), False)
+    assert math.isnan(at_error({"fails": "over 60 s"}, 1e-5)[0])

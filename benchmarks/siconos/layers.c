@@ -47,3 +47,10 @@ void internal_by_velocity(double t, unsigned int n, const double *x, const doubl
   j[2] = -2 * twist * v[1];
   j[3] = z[DAMPING];
 }
+
+/* A sine that acts on the first coordinate of a linear structure; z has its amplitude and its frequency. */
+void wave(double t, unsigned int n, double *f, unsigned int size, double *z)
+{
+  for (unsigned int i = 0; i < n; i++) f[i] = 0;
+  f[0] = z[0] * sin(z[1] * t);
+}

@@ -18,10 +18,12 @@ def march(equations, task):
     seconds = []
     for _ in range(task["rounds"]):
         if "mass" in task:
-            bodies, model = linear_bodies(task)
+            bodies, model = linear_bodies(equations, task)
             simulation = time_stepping(model, task)
+            start = time.process_time()
             simulation.run()
-            return {"state": [*bodies.q(), *bodies.velocity()]}
+            seconds = [time.process_time() - start]
+            return {"state": [*bodies.q(), *bodies.velocity()], "time": simulation.startingTime(), "seconds": seconds}
         layers = sk.LagrangianDS(np.array(task["opening"]), np.array(task["velocity"]))
         layers.setzPtr(np.array(task["numbers"]))
         layers.setComputeMassFunction(equations, "mass")
@@ -48,11 +50,17 @@ def time_stepping(model, task):
     return simulation
 
 
-def linear_bodies(task):
-    """M q'' + K q = f with the gaps H q + b >= 0, a row each, and their restitution."""
-    mass, stiffness, force = (np.array(task[name], dtype=float) for name in ("mass", "stiffness", "force"))
-    bodies = sk.LagrangianLinearTIDS(np.array(task["position"]), np.array(task["velocity"]), mass, stiffness, 0.0 * mass)
-    bodies.setFExtPtr(force)
+def linear_bodies(equations, task):
+    """M q'' + C q' + K q = f with the gaps H q + b >= 0, a row each, and their restitution; f is constant, or a sine that acts on
+    the first coordinate."""
+    mass, stiffness = (np.array(task[name], dtype=float) for name in ("mass", "stiffness"))
+    damping = np.array(task.get("damping", 0.0 * mass), dtype=float)
+    bodies = sk.LagrangianLinearTIDS(np.array(task["position"]), np.array(task["velocity"]), mass, stiffness, damping)
+    if "wave" in task:
+        bodies.setzPtr(np.array(task["wave"]))
+        bodies.setComputeFExtFunction(equations, "wave")
+    else:
+        bodies.setFExtPtr(np.array(task["force"], dtype=float))
     model = sk.NonSmoothDynamicalSystem(0.0, task["duration"])
     model.insertDynamicalSystem(bodies)
     for row, offset, e in zip(task["rows"], task["offsets"], task["e"], strict=True):
