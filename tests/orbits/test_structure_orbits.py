@@ -5,6 +5,7 @@ import pytest
 from scipy.optimize import brentq, fsolve, minimize_scalar
 
 import saltus
+from saltus.orbits.equations.whole_motion import WholeMotionEquations
 
 STIFFNESS = np.array([[2.0, -1.0], [-1.0, 1.0]])
 SQUARES, SHAPES = np.linalg.eigh(STIFFNESS)
@@ -80,3 +81,24 @@ def test_a_branch_meets_a_soft_stop_where_the_linear_amplitude_does_and_folds_wh
             at(size, sign)
         found = minimize_scalar(at, bounds=around, args=(sign,), method="bounded", options={"xatol": 1e-4})
         assert sign * found.fun == pytest.approx(fold, abs=1e-6)
+
+
+def test_orbits_of_many_coordinates_are_approached_without_derivatives(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Derivatives take as long as so many motions as there are unknowns: most orbits of a branch need them once."""
+    asked = []
+    derived = WholeMotionEquations._evaluated
+    monkeypatch.setattr(WholeMotionEquations, "_evaluated", lambda *given: asked.append(0) or derived(*given))
+    stiffness = 2.0 * np.eye(5) - np.eye(5, k=1) - np.eye(5, k=-1)
+    stop = saltus.Surface(name="stop", coordinate=4, position=0.1, stiffness=0.3)
+    chain = saltus.Structure(mass=np.eye(5), damping=0.1 * stiffness, stiffness=stiffness, surfaces=[stop], forces={"f": 0})
+    system = saltus.System(model=chain, load=saltus.Load(frequency=0.51, f=saltus.Harmonic(0.03)))
+    orbit = saltus.find_orbit(system, **chain.start())
+    assert len(orbit.motion().events) == 2
+    asked.clear()
+    branch = saltus.continue_orbit(orbit, "load.frequency", (0.505, 0.52))
+    assert len(asked) < 1.5 * len(branch.points)
+    for point in branch.points[::8]:
+        assert point.residual < 1e-13
+        assert point.orbit.defect < 1e-12
+        beside = point.place + 1e-3
+        assert point.curve.residual(beside) == pytest.approx(point.curve.evaluate(beside, True).residual, abs=1e-12)

@@ -72,7 +72,7 @@ def _near(a: Any, b: Any, guess: np.ndarray, index: int, value: float) -> Any:
 def _at_share(a: Any, b: Any, share: float) -> Any:
     """The point at a share of the way."""
     chord = b.place - a.place
-    return a.curve.solve(between(a, b, share), chord / a.curve.norm(chord))
+    return a.curve.solve_beside(between(a, b, share), chord / a.curve.norm(chord), a)
 
 
 def _share(a: Any, b: Any, index: int, value: float) -> float:

@@ -119,6 +119,10 @@ class Curve(ABC, Generic[P]):
     def solve(self, guess: np.ndarray, direction: np.ndarray) -> P | None:
         """The point near a guess, in the hyperplane through the guess that is normal to a direction of length 1."""
 
+    def solve_beside(self, guess: np.ndarray, direction: np.ndarray, point: P) -> P | None:
+        """`solve` beside a point that is known, whose derivatives may be used."""
+        return self.solve(guess, direction)
+
     @abstractmethod
     def solve_at(self, guess: np.ndarray, direction: np.ndarray, index: int = -1) -> P | None:
         """The point near a guess that has the guess's value in the component `index`; its tangent points along the direction."""

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -62,6 +62,7 @@ def newton(
     iterations: int,
     residual_floor: float = 0.0,
     near: bool = False,
+    before: float = np.inf,
 ) -> Corrected[E] | None:
     """The zero of a system near a guess, or None where Newton's method does not converge.
 
@@ -81,8 +82,10 @@ def newton(
         unknowns by no more than `converged`.
     near
         Whether the guess itself is probably a solution: it is then evaluated thoroughly at once.
+    before
+        The residual at the guess where it is known already, up to rounding.
     """
-    place, before = guess.copy(), np.inf
+    place = guess.copy()
     for iteration in range(iterations + 1):
         thorough = before <= NEWTON.last or (near and iteration == 0)
         found = evaluate(place, thorough)
@@ -132,12 +135,45 @@ class EquationCurve(Curve[P]):
     def point_at(self, found: Corrected[Any], tangent: np.ndarray) -> P:
         """A solution as a point."""
 
+    def residual(self, place: np.ndarray) -> np.ndarray | None:
+        """F alone at a place, up to rounding, where that takes far less time than with its derivatives; else None."""
+        return None
+
+    def derivatives_at(self, point: P) -> np.ndarray:
+        """The derivatives at a point of the curve, for curves that have `residual`."""
+        raise NotImplementedError
+
+    def approached(self, guess: np.ndarray, direction: np.ndarray, point: P, reach: float = math.inf) -> tuple[np.ndarray, float]:
+        """A place in the hyperplane of `solve` that is nearer to the curve than the guess, by Broyden's method from the
+        derivatives at a point beside it, with its residual; the guess and inf without `residual`."""
+        found = self.residual(guess) if point.curve.joins(self) else None
+        if found is None:
+            return guess, math.inf
+        normal, place, right = direction * self.weights**2, guess, bordered(found, 0.0)
+        matrix, error = bordered(self.derivatives_at(point), normal), float(np.abs(found).max())
+        for _ in range(self.iterations_at):
+            step = _step(matrix, -right) if NEWTON.converged < error < NEWTON.diverged else None
+            if step is None or self.norm(place + step - guess) > reach:
+                break
+            found = self.residual(place + step)
+            if found is None or not (left := float(np.abs(found).max())) < NEWTON.circling * error:
+                break
+            place, before, right, error = place + step, right, bordered(found, normal @ (place + step - guess)), left
+            matrix += np.outer(right - before - matrix @ step, step) / (step @ step)
+        return place, error
+
+    def solve_beside(self, guess: np.ndarray, direction: np.ndarray, point: P) -> P | None:
+        place, before = self.approached(guess, direction, point)
+        return self.solve(guess, direction) if place is guess else self.solve_within(place, direction, math.inf, before=before)
+
     def solve(self, guess: np.ndarray, direction: np.ndarray) -> P | None:
         return self.solve_within(guess, direction, math.inf, near=True)  # most guesses lie between points that are known
 
-    def solve_within(self, guess: np.ndarray, direction: np.ndarray, reach: float, near: bool = False) -> P | None:
+    def solve_within(
+        self, guess: np.ndarray, direction: np.ndarray, reach: float, near: bool = False, before: float = math.inf
+    ) -> P | None:
         """`solve`, but None if Newton's method leads farther than `reach` from the guess or, for a finite `reach`, in circles.
-        `near` is that of `newton`."""
+        `near` and `before` are those of `newton`."""
         normal, errors = direction * self.weights**2, list[float]()
 
         def within_reach(place: np.ndarray, thorough: bool) -> Evaluation | None:
@@ -152,7 +188,7 @@ class EquationCurve(Curve[P]):
             return bordered(found.derivatives(), normal), -bordered(found.residual, normal @ (place - guess))
 
         evaluate = self.evaluate if reach == math.inf else within_reach
-        found = newton(evaluate, linear, guess, self.iterations, self.residual_floor, near)
+        found = newton(evaluate, linear, guess, self.iterations, self.residual_floor, near, before)
         return None if found is None else self.with_tangent(found, direction)
 
     def solve_at(self, guess: np.ndarray, direction: np.ndarray, index: int = -1) -> P | None:
@@ -201,7 +237,11 @@ class EquationCurve(Curve[P]):
     def advance(self, before: P | None, point: P, step: float) -> P | None:
         """The point a step further; None if Newton's method does not converge, or converges too far from the predicted place."""
         guess = predicted(before, point, step)
-        ahead = self.solve_within(guess, point.tangent, self.corrector_radius * step)
+        reach = self.corrector_radius * step
+        begin, before_it = self.approached(guess, point.tangent, point, reach)
+        ahead = self.solve_within(begin, point.tangent, reach, before=before_it)
+        if ahead is not None and begin is not guess:
+            ahead = replace(ahead, iterations=ahead.iterations + 1)
         straight = before is None or not before.curve.joins(point.curve)
         off = STEPS.off_tangent if straight else STEPS.off
         return None if ahead is None or self.norm(ahead.place - guess) >= off * step else ahead

@@ -129,7 +129,7 @@ class Trail:
         """The trail point at a share of the way between two, or None if the curve cannot be solved for there."""
         chord = b.point.place - a.point.place
         curve = a.point.curve
-        point = curve.solve(between(a.point, b.point, share), chord / curve.norm(chord))
+        point = curve.solve_beside(between(a.point, b.point, share), chord / curve.norm(chord), a.point)
         if point is None:
             return None
         first, second = arc(a.point, point), arc(point, b.point)

@@ -220,7 +220,8 @@ class Recorder:
         self._system, self._times, self._columns = request.system, request.sample_times, run.structure.sizes.columns
         self._own, self._several = run.structure.sizes.own, run.structure.several
         kept, wide = request.dense or request.sample_times is not None, request.dense and request.sample_times is None
-        size, rows = MOST.buffer if kept else 8, self._own * (1 + self._columns if wide else 1)
+        self._wide = wide and request.dense_tangent
+        size, rows = MOST.buffer if kept else 8, self._own * (1 + self._columns if self._wide else 1)
         self.steps = StepBuffers(np.empty((size, 2), dtype=np.int64), np.empty((size, 2)), np.empty((size, rows, order + 2)))
         # The numbers of an event before its shifts:
         self._width = 1 + 2 * self._own + len(run.structure.signs) if self._several else 3
@@ -306,8 +307,8 @@ class Recorder:
         return self._output(0, self._own)
 
     def tangent(self) -> DenseOutput | None:
-        """That of its columns, the coordinates of one after those of the other; None without any."""
-        return self._output(self._own, self._own * (1 + self._columns)) if self._columns else None
+        """That of its columns, the coordinates of one after those of the other; None without any, or where they were not kept."""
+        return self._output(self._own, self._own * (1 + self._columns)) if self._columns and self._wide else None
 
     def _output(self, first: int, last: int) -> DenseOutput | None:
         if self._times is not None or not self._pieces:

@@ -94,6 +94,7 @@ class MotionRequest:
     dense: bool
     times: Any = None
     sensitivities: tuple[str, ...] | None = None  # parameters to differentiate to; None without derivatives
+    dense_tangent: bool = True  # whether the derivatives along a dense motion are kept too
     # These follow from the arguments; the system is put into coordinates of its gaps, and so are position and speeds:
     given: System = field(init=False)  # the system as it was given
     position: np.ndarray = field(init=False)

@@ -89,6 +89,13 @@ class OrbitCurve(EquationCurve[OrbitPoint]):
         n = self.equations.size
         return self.equations.evaluate(place[:n], place[n:], with_extremes=thorough)
 
+    def residual(self, place: np.ndarray) -> np.ndarray | None:
+        n = self.equations.size
+        return self.equations.residual(place[:n], place[n:]) if n > self.iterations else None  # derivatives take some n motions
+
+    def derivatives_at(self, point: OrbitPoint) -> np.ndarray:
+        return point.evaluation.derivatives()
+
     def point_at(self, found: Corrected[Any], tangent: np.ndarray) -> OrbitPoint:
         return OrbitPoint(self, found.place, tangent, found.iterations, found.evaluation)
 

@@ -77,6 +77,10 @@ class ConditionedCurve(OrbitCurve):
         value = None if evaluation is None else self.condition.evaluate(Solution(place[:n], place[n:], evaluation, 0))
         return None if value is None else Conditioned(evaluation, value)
 
+    def residual(self, place: np.ndarray) -> np.ndarray | None:
+        """None: the condition needs the derivatives."""
+        return None
+
     def solve(self, guess: np.ndarray, direction: np.ndarray) -> Any:
         """The point near a guess in the hyperplane through it normal to a direction, which may be of any length."""
         return super().solve(guess, direction / self.norm(direction))

@@ -143,7 +143,7 @@ class OrbitEquations(ABC):
 
     and, where they differ from what stands here,
 
-    5. **halving and repeating**: `halves` (both halves of a period as unknowns of the equations over one half, by which orbits
+    5. **F alone**: `residual`; and **halving and repeating**: `halves` (both halves of a period as unknowns of the equations over one half, by which orbits
        that are their own images are known), `repeated` and `alternating` (the unknowns, and a perturbation, of an orbit that goes
        round twice);
     6. **renumbering**: `nearest`, the unknowns of an orbit counted as those of another one; `at_section_of` and
@@ -172,7 +172,7 @@ class OrbitEquations(ABC):
             )
         self.given, self.signature, self.paths, self.tol = system, signature, paths, tol
         self.system = system = system.in_gap_coordinates
-        self._run = _ready(system, paths)
+        self._run: Any = program(system, system.model.margin_names(system.load), paths)
         if self._run.trace.records:
             raise ParameterError(
                 "a load with a Record or a pulse is not periodic, so it has no periodic orbits; use Harmonic signals"
@@ -212,6 +212,10 @@ class OrbitEquations(ABC):
     @abstractmethod
     def size(self) -> int:
         """The number of unknowns."""
+
+    def residual(self, unknowns: np.ndarray, values: np.ndarray) -> np.ndarray | None:
+        """F alone, up to rounding, where that takes far less time than with its derivatives; else None, or without a motion."""
+        return None
 
     @abstractmethod
     def evaluate(
@@ -402,8 +406,3 @@ class OrbitEquations(ABC):
     def over_full_period(self, unknowns: np.ndarray) -> tuple[Self, np.ndarray]:
         """The equations of the full period of a symmetric orbit, and the orbit's unknowns in them."""
         return self.with_signature(self.signature.over_full_period(self.images)), self.repeated(unknowns)
-
-
-def _ready(system: System, paths: tuple[str, ...]) -> Any:
-    """The compiled program of a system with derivatives to the parameters at `paths`, and with all of the model's margins."""
-    return program(system, system.model.margin_names(system.load), paths)

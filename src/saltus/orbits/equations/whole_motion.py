@@ -27,6 +27,7 @@ from saltus.flow import (
     Stop,
     derivatives_of,
     program,
+    simulate,
     state_rates,
 )
 from saltus.orbits.branches.beyond_events import (
@@ -212,6 +213,24 @@ class WholeMotionEquations(OrbitEquations):
             self._latest = place, (motion, evaluation)
         return evaluation
 
+    def residual(self, unknowns: np.ndarray, values: np.ndarray) -> np.ndarray | None:
+        frequency = self.frequency(values)
+        if not (frequency > 0.0 and np.isfinite(unknowns).all() and np.isfinite(values).all()):
+            return None
+        try:
+            system = self.system_at(values)
+            state = arguments_of(system, self.start_state(unknowns, system))
+            time = float(self.signature.section or 0.0) / frequency
+            motion = simulate(system, **state, time=time, periods=self.signature.span, tol=self.tol, dense=False)
+        except SaltusError:
+            return None
+        if motion.limit is not None:
+            return None
+        after = np.append(np.atleast_1d(motion.position), np.atleast_1d(motion.velocity))
+        after = image_of(system.model, after) if self.signature.symmetric else after
+        after[self.following] = 0.0
+        return np.asarray(after - unknowns)
+
     def _evaluated(self, unknowns: np.ndarray, values: np.ndarray) -> tuple[Motion, WholeMotionEvaluation] | None:
         """The motion over the time that the equations cover, and the equations without extremes; None where the motion cannot be
         followed."""
@@ -274,6 +293,7 @@ class WholeMotionEquations(OrbitEquations):
             stop_at=(),
             dense=True,
             sensitivities=self.paths,
+            dense_tangent=False,
         )
         return derivatives_of(request, self._program.with_numbers(parameters, self._records))
 
