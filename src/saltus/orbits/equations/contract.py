@@ -143,9 +143,9 @@ class OrbitEquations(ABC):
 
     and, where they differ from what stands here,
 
-    5. **F alone**: `residual`; and **halving and repeating**: `halves` (both halves of a period as unknowns of the equations over one half, by which orbits
-       that are their own images are known), `repeated` and `alternating` (the unknowns, and a perturbation, of an orbit that goes
-       round twice);
+    5. **F alone**: `residual`; **halving and repeating**: `halves` (both halves of a period as unknowns of the equations over one
+       half, by which orbits that are their own images are known), `repeated` and `alternating` (the unknowns, and a perturbation,
+       of an orbit that goes round twice);
     6. **renumbering**: `nearest`, the unknowns of an orbit counted as those of another one; `at_section_of` and
        `at_another_section`, if the state is given at a section that moves;
     7. **what bounds a step**: `barrier`, a test function that is negative where the equations do not hold, and `accepts`;
