@@ -585,3 +585,17 @@ def test_what_cannot_be_followed_is_refused_when_the_system_is_made():
         System(model=model_with(Contact(name="a", coordinate=SUM), frictions=rubbed))
     with pytest.raises(saltus.ParameterError, match="y_minus_z = -2 lies beyond the contact 'left' at y_minus_z = -1"):
         simulate(DAMPER, z=0.0, y=-2.0, duration=1.0)
+
+
+def test_extrema_of_forcing_periods_are_those_of_many_samples_of_the_own_coordinates():
+    motion = simulate(DAMPER, z=0.0, y=0.0, velocity=(0.0, 0.1), periods=12)
+    ends = np.minimum(np.arange(13) * SHAKE.period, motion.time)
+    found = motion.extrema_between(ends)
+    hits = motion.impacts.time  # in which a body may be farthest out
+    times = [np.append(np.linspace(a, b, 4001), hits[(hits > a) & (hits < b)]) for a, b in itertools.pairwise(ends)]
+    sampled = [motion.at(each)[0] for each in times]
+    expected = np.array([[(x.min(), x.max()) for x in period] for period in sampled])
+    np.testing.assert_allclose(found, expected, rtol=0, atol=2e-6)  # acceleration times (period / 4000)^2 / 8
+    assert (found[:, :, 0] <= expected[:, :, 0] + 1e-15).all()
+    assert (found[:, :, 1] >= expected[:, :, 1] - 1e-15).all()
+    assert np.array_equal(motion.extrema, np.stack([found[:, :, 0].min(axis=0), found[:, :, 1].max(axis=0)], axis=1))

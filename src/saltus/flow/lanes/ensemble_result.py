@@ -144,10 +144,11 @@ class EnsembleResult:
         for row, count in enumerate(np.minimum(periods, kept).tolist()):
             numbers = {path: float(np.broadcast_to(a, size)[row]) for path, a in self.inputs.parameters.items()}
             system, state = self.system.with_(numbers), arguments_of(self.system, last[row])
-            for k in range(kept - count, kept):
-                motion = simulate(system, **state, duration=float(length[row]), tol=self.options.tol)
-                extrema[row, k] = motion.extrema[:, 1].max(), motion.extrema[:, 0].min()
-                state = arguments_of(system, motion.final_state)
+            if count > 0:
+                motion = simulate(system, **state, duration=count * float(length[row]), tol=self.options.tol)
+                ends = np.minimum(motion.start + np.arange(count + 1) * length[row], motion.time)  # of the forcing periods
+                found = motion.extrema_between(ends)
+                extrema[row, kept - count :] = np.stack([found[:, :, 1].max(axis=1), found[:, :, 0].min(axis=1)], axis=1)
         return extrema
 
     @cached_property

@@ -223,30 +223,58 @@ class Motion(Result):
         ParameterError
             The motion was computed with dense=False.
         """
-        self._check_times(np.empty(0))
-        ends, dense = np.array([self.start, self.time]), self.dense
-        steps = np.empty((0, 2)) if dense is None else np.stack([dense.start, dense.start + dense.length], axis=1)
-        times = np.clip(steps[:, :1] + SHARES * np.diff(steps, axis=1), *ends)
-        position, velocity, _ = self._states(np.append(times.ravel(), ends))
-        found = []
-        for i, (x, v) in enumerate(zip(position, velocity, strict=True)):
-            rate = v[:-2].reshape(times.shape)
-            turns = rate[:, :-1] * rate[:, 1:] < 0.0
-            x = np.append(x, self._turned(i, times[:, :-1][turns], times[:, 1:][turns]))
-            found.append((x.min(), x.max()))
-        return np.array(found)
+        found: np.ndarray = self.extrema_between(np.array([self.start, self.time]))[0]
+        return found
 
-    def _turned(self, place: int, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-        """A coordinate where its velocity is 0 between two times, of which it has different signs, (n,) each: by regula falsi,
-        in which the value at an end that stays is halved. The coordinate's error is the square of that of the time."""
-        a, b = (self._states(times)[1][place] for times in (low, high))
+    def extrema_between(self, bounds: np.ndarray) -> np.ndarray:
+        """The least and the largest value of each coordinate between every two neighbours of times in ascending order.
+
+        Parameters
+        ----------
+        bounds
+            Dimensionless times of the motion, (n,).
+
+        Returns
+        -------
+        np.ndarray
+            Of shape (n - 1, degrees of freedom, 2).
+
+        Raises
+        ------
+        ParameterError
+            A time lies outside the motion, or the motion was computed with dense=False.
+        """
+        self._check_times(bounds)
+        steps = [] if self.dense is None else [self.dense.start, self.dense.start + self.dense.length]
+        edges = np.unique(np.clip(np.concatenate([bounds, *steps]), bounds[0], bounds[-1]))
+        times = edges[:-1, None] + SHARES * np.diff(edges)[:, None]
+        position, velocity, _ = self._states(np.append(times.ravel(), bounds))
+        at_bounds, rate = position[:, times.size :].T, velocity[:, : times.size].reshape(-1, *times.shape)
+        place, step, sample = np.nonzero(rate[:, :, :-1] * rate[:, :, 1:] < 0.0)
+        turned = self._turned(place, times[step, sample], times[step, sample + 1])
+        within = np.searchsorted(bounds, edges[:-1], side="right") - 1
+        inner = position[:, : times.size].reshape(rate.shape).transpose(1, 2, 0)
+        found = []
+        for extremum in (np.minimum, np.maximum):
+            values = extremum(at_bounds[:-1], at_bounds[1:])
+            extremum.at(values, within, extremum.reduce(inner, axis=1))
+            extremum.at(values, (within[step], place), turned)
+            found.append(values)
+        return np.stack(found, axis=-1)
+
+    def _turned(self, place: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+        """Coordinates, by their places, where their velocities are 0 between two times at which these have different signs, (n,)
+        each: by regula falsi, in which the value at an end that stays is halved. A coordinate's error is the square of that of
+        the time."""
+        each = np.arange(len(place))
+        a, b = (self._states(times)[1][place, each] for times in (low, high))
         for _ in SHARES:
             middle = low - a * (high - low) / np.where(a == b, 1.0, b - a)
-            now = self._states(middle)[1][place]
+            now = self._states(middle)[1][place, each]
             same = now * b > 0.0  # the root lies before
             a, b = np.where(same, 0.5 * a, now), np.where(same, now, 0.5 * b)
             low, high = np.where(same, low, middle), np.where(same, middle, high)
-        return self._states(middle)[0][place] if low.size else low
+        return self._states(middle)[0][place, each] if low.size else low
 
     @cached_property
     def validity(self) -> Validity:
