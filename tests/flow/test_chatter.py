@@ -53,12 +53,12 @@ def averaged_speed(system, v0, duration, contact=0.0):
     arguments = {"velocity": v0, "periods": None, "duration": duration, "tol": 1e-14, "time": 0.0, "side": None}
     coordinates = {system.model.coordinates[0]: contact}
     request = MotionRequest(system=system, coordinates=coordinates, stop_at=(), dense=False, **arguments)
-    now = KernelState.at_start(request, run)
-    steps = StepBuffers(np.empty((64, 2), dtype=np.int64), np.empty((64, 2)), np.empty((64, 1, now.numbers["order"] + 2)))
+    now = KernelState(request, run)
+    steps = StepBuffers(np.empty((64, 2), dtype=np.int64), np.empty((64, 2)), np.empty((64, 1, now.numbers.order + 2)))
     events = EventBuffers(np.empty((64, 4), dtype=np.int64), np.empty((64, 3)))
     assert now.advance(run, steps, events) == Status.DONE
-    assert now.numbers["mode"] == Mode.CHATTER
-    return now.numbers["chatter_speed"]
+    assert now.numbers.mode == Mode.CHATTER
+    return now.numbers.chatter_speed
 
 
 SYMMETRIC = {"C": 0.1, "V": -0.5, "H": 0.05, "W": 0.3}

@@ -3,6 +3,7 @@
 Work is counted in calls of functions, which are the same on every machine.
 """
 
+import math
 import pickle
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -13,14 +14,14 @@ import numpy as np
 import pytest
 from shared_systems import forced
 
-from saltus import Harmonic, Load, Model, NewtonImpact, System, TwoLayer, simulate
+from saltus import Harmonic, Load, Model, NewtonImpact, ParameterError, System, TwoLayer, simulate
 
 LAYERS = System(
     model=TwoLayer(beta0=1.4, damping=0.1, mass_ratio=0.2),
     load=Load(frequency=1.0, vertical=-0.5, horizontal=Harmonic(amplitude=0.4)),
     impact=NewtonImpact(e=0.5),
 )
-CASES = {"one contact": (forced(), {"theta": 0.3}, 130), "two layers": (LAYERS, {"theta_1": 0.1, "theta_2": -0.05}, 220)}
+CASES = {"one contact": (forced(), {"theta": 0.3}, 65), "two layers": (LAYERS, {"theta_1": 0.1, "theta_2": -0.05}, 120)}
 stiffness = 1.0
 
 
@@ -42,6 +43,32 @@ def test_a_second_motion_of_a_system_checks_and_traces_nothing_of_it(name):
     again = calls(lambda: simulate(system, periods=1, **start))
     assert not {"trace", "children", "numbers", "record_table", "Structure.prepare", "_check_class", "energy_gain"} & {*again}
     assert len(again) < most
+
+
+def test_arguments_are_checked_whenever_they_are_others():
+    system, margins = forced(), ["kinematic_limit"]
+    simulate(system, theta=0.3, periods=1, stop_at=margins)
+    margins.append("no_margin")
+    with pytest.raises(ParameterError, match="no_margin"):
+        simulate(system, theta=0.3, periods=1, stop_at=margins)
+    for name, wrong in {"periods": True, "tol": 1.0, "time": math.nan, "side": 2}.items():
+        with pytest.raises(ParameterError, match=name):
+            simulate(system, theta=0.3, **{"periods": 1, name: wrong})
+    assert simulate(system, theta=0.3, periods=1).time == simulate(system, theta=0.3, periods=1, time=0.0).time != 0.0
+
+
+@pytest.mark.parametrize("dense", [True, False])
+def test_a_motion_is_its_own_whatever_is_simulated_next(dense):
+    first, others = (simulate(forced(), theta=0.3, periods=3, dense=dense) for _ in range(2))
+    simulate(forced(), theta=0.5, periods=3, dense=dense)
+    long = simulate(forced(), theta=0.3, periods=400, dense=dense)  # its buffers are filled several times
+    assert len(first.events) > 0
+    np.testing.assert_array_equal(first.events.times, others.events.times)
+    np.testing.assert_array_equal(long.events.times[: len(first.events)], first.events.times)
+    assert (np.diff(long.events.times) > 0).all()
+    if dense:
+        times = np.linspace(0.0, first.time, 50)
+        np.testing.assert_array_equal(first.at(times[:-1]), long.at(times[:-1]))
 
 
 def test_impacts_and_margins_are_made_when_they_are_read():

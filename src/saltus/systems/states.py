@@ -46,12 +46,13 @@ def read_start(
     if isinstance(model, InGapCoordinates) and coordinates.keys() & {*model.own_class.coordinates} - {*model.coordinates}:
         own = system.with_(model=model.as_given())
         return np.concatenate(own.to_gaps(time, *np.split(read_start(own, velocity, coordinates, arguments), 2)))
-    names = system.model.coordinates
-    positions = _positions(system, coordinates, arguments)
-    speeds = _speeds(velocity, system.model)
-    for name, value in (*zip(names, positions, strict=True), *(("velocity", speed) for speed in speeds)):
-        check_number(name, _plain(value))
-    return system._with_rates(time, np.array([*positions, *speeds], dtype=float))
+    names, most = model.coordinates, LIMITS.value
+    positions = coordinates.values() if tuple(coordinates) == names else _positions(system, coordinates, arguments)
+    values = [*positions, *_speeds(velocity, model)]
+    for i, value in enumerate(values):
+        if not (type(value) is float and abs(value) <= most):
+            check_number(names[i] if i < len(names) else "velocity", _plain(value))
+    return system._with_rates(time, np.array(values, dtype=float))
 
 
 def read_starts(
@@ -98,6 +99,8 @@ def _speeds(velocity: Any, model: Model, many: bool = False) -> tuple[Any, ...]:
     """The velocities of all coordinates, of which each number may be an array if there are `many`; 0 for those of first order,
     whose velocities may be given and are not read."""
     count, none = len(model.moving), (0.0,) * len(model.first_order)
+    if type(velocity) is float and count == 1:
+        return (velocity, *none)
     if count == 1 and (many or not _is_sequence(velocity)):
         return (velocity, *none)
     if _is_sequence(velocity) and len(velocity) in (count, count + len(none)):

@@ -389,6 +389,8 @@ def check_system(
     """
     if not isinstance(system, System):
         raise ParameterError(f"{asking} takes a System(model=..., load=..., impact=...), got {shown(system)}", "system")
+    if several_contacts and sums and coordinates is None:
+        return
     inner, names = system.in_gap_coordinates, system.model.coordinates
     if inner is not system and not sums:
         raise ParameterError(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 from types import ModuleType
 from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
@@ -368,8 +368,9 @@ def program(system: System, limits: tuple[str, ...] | None = None, sensitivities
     structure is traced and compiled unless it is known; its numbers are filled in at the first time."""
     limits, key = limits_of(system, ()) if limits is None else limits, structure_key(system)
     run: Program = system._remembered((limits, sensitivities), lambda: _made(system, (key, limits, sensitivities)))
-    copied = (run.env[0].copy(), *run.env[1:])  # with several contacts the kernel writes which coordinates are free
-    return replace(run, env=copied) if run.structure.several else run
+    if not run.structure.several:
+        return run
+    return replace(run, env=(run.env[0].copy(), *run.env[1:]))  # the kernel writes which coordinates are free
 
 
 def _made(system: System, asked: tuple[Any, ...]) -> Program:
@@ -391,6 +392,7 @@ def limits_of(system: System, stop_at: Iterable[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*own, *asked)))
 
 
+@lru_cache
 def taylor_order(tol: float) -> int:
     """The order of series that is fastest at a tolerance: 10 at 1e-6, 15 at 1e-10, 20 at 1e-14."""
     return round(10 + 1.25 * (-math.log10(tol) - 6))

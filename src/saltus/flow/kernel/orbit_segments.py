@@ -40,7 +40,7 @@ class SegmentFollower:
     """Follows the segments of orbits of one structure at a tolerance; numbers are given with each call."""
 
     def __init__(self, run: Program, tol: float) -> None:
-        self._run, self._numbers = run, motion_record(taylor_order(tol), run.structure.sizes)
+        self._run, (self._numbers, _) = run, motion_record(taylor_order(tol), run.structure.sizes)
         self._numbers["tolerance"] = tol
         record = self._numbers[0]
         self.own = int(record["own"])  # degrees of freedom

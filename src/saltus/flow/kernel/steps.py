@@ -75,10 +75,12 @@ def expand(motion, t, side, order):
 def growth(coefficients, first, last, size):
     """The largest log(abs(c_k) / size) / k for first <= k <= last: minus the log of the radius of convergence by these terms."""
     largest = -np.inf
-    for i in range(coefficients.shape[0]):
-        for k in range(first, last + 1):
-            if coefficients[i, k] != 0.0:
-                largest = max(largest, math.log(abs(coefficients[i, k]) / size) / k)
+    for k in range(first, last + 1):
+        term = 0.0
+        for i in range(coefficients.shape[0]):
+            term = max(term, abs(coefficients[i, k]))
+        if term > 0.0:
+            largest = max(largest, math.log(term / size) / k)
     return largest
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from enum import StrEnum
+from functools import cached_property
 from typing import Any, Self, overload
 
 import numpy as np
@@ -110,12 +111,17 @@ class Impacts(RowTable):
 class MotionEvents(RowTable, Sequence[Event]):
     """The events of a motion in order of time, made one by one from the kernel's arrays."""
 
-    def __init__(self, times: np.ndarray, labels: np.ndarray, values: np.ndarray) -> None:
-        self.times = times  # (n,)
-        self._labels, self._values = labels, values
+    def __init__(self, length: float, labels: np.ndarray, values: np.ndarray) -> None:
+        self._length, self._labels, self._values = length, labels, values
+
+    @cached_property
+    def times(self) -> np.ndarray:
+        """The dimensionless times, (n,): the kernel counts forcing periods of a `length` apart from the time within them."""
+        times: np.ndarray = self._labels[:, 0] * self._length + self._values[:, 0]
+        return times
 
     def __len__(self) -> int:
-        return int(self.times.size)
+        return len(self._labels)
 
     @overload
     def __getitem__(self, index: int) -> Event: ...
@@ -125,7 +131,7 @@ class MotionEvents(RowTable, Sequence[Event]):
         return self._only(index) if isinstance(index, slice) else self._event(index)
 
     def _only(self, chosen: Any) -> Self:
-        return type(self)(self.times[chosen], self._labels[chosen], self._values[chosen])
+        return type(self)(self._length, self._labels[chosen], self._values[chosen])
 
     def _event(self, index: int) -> Any:
         kind, side = self._labels[index, 1:3]
@@ -192,13 +198,13 @@ class ContactEvents(MotionEvents):
     """The events of a motion with several contacts or frictions, in order of time."""
 
     def __init__(
-        self, times: np.ndarray, labels: np.ndarray, values: np.ndarray, contacts: Sequence[str], frictions: Sequence[str]
+        self, length: float, labels: np.ndarray, values: np.ndarray, contacts: Sequence[str], frictions: Sequence[str]
     ) -> None:
-        super().__init__(times, labels, values)
+        super().__init__(length, labels, values)
         self._contacts, self._frictions, self._own = contacts, frictions, (values.shape[1] - 1 - len(contacts)) // 2
 
     def _only(self, chosen: Any) -> ContactEvents:
-        return ContactEvents(self.times[chosen], self._labels[chosen], self._values[chosen], self._contacts, self._frictions)
+        return ContactEvents(self._length, self._labels[chosen], self._values[chosen], self._contacts, self._frictions)
 
     def _event(self, index: int) -> ContactEvent:
         kind, bits = (int(x) for x in self._labels[index, 1:3])
@@ -214,7 +220,7 @@ class ContactEvents(MotionEvents):
         for i in (1, 1 + self._own):  # before and after
             velocity = self._values[:, i : i + self._own].T
             values[:, i : i + self._own] = system.from_gaps(self.times, velocity, velocity)[1].T
-        return ContactEvents(self.times, self._labels, values, self._contacts, self._frictions)
+        return ContactEvents(self._length, self._labels, values, self._contacts, self._frictions)
 
     def _called(self, bits: int) -> str:
         chosen = [name for i, name in enumerate((*self._contacts, *self._frictions)) if bits >> i & 1]

@@ -4,9 +4,9 @@ fills: all steps of the motion, the states at given times, or its events alone."
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from saltus.errors import MotionError, ParameterError
 from saltus.flow.contacts.layout import ContactColumn, FrictionColumn, NoMargin
 from saltus.flow.kernel.compiled import Program, load_contacts_kernel, load_kernel, taylor_order
 from saltus.flow.kernel.layout import EventCode, Mode, side_of_state
-from saltus.flow.kernel.memory import EventBuffers, StepBuffers, motion_record
+from saltus.flow.kernel.memory import AT_START, WHOLE_RECORD, EventBuffers, MotionNumbers, StepBuffers, motion_record
 from saltus.flow.motion.events import ContactEvents, MotionEvents
 from saltus.flow.motion.motion import Samples
 from saltus.flow.motion.validity import DenseOutput, Validity, ValidityCheck
@@ -28,21 +28,10 @@ if TYPE_CHECKING:
 NO_ROWS = np.zeros((0, len(FrictionColumn)), dtype=np.int64)
 
 
-@dataclass(frozen=True, eq=False)
 class KernelState:
     """What the kernel changes: the numbers of a motion, and its state."""
 
-    array: np.ndarray  # one record MOTION
-    state: np.ndarray  # coordinates and velocities, each followed by the tangent's columns, and the shifts
-    rows: np.ndarray = field(default_factory=lambda: NO_ROWS)  # of several contacts
-
-    @cached_property
-    def numbers(self) -> Any:
-        """The numbers of the motion, by the names of MOTION."""
-        return self.array[0]
-
-    @classmethod
-    def at_start(cls, request: MotionRequest, run: Program) -> Self:
+    def __init__(self, request: MotionRequest, run: Program) -> None:
         """The state in which a motion starts.
 
         Raises
@@ -50,83 +39,75 @@ class KernelState:
         ParameterError
             The state lies beyond the contact, or the model's gap or reset is impossible.
         """
-        array, at = motion_record(taylor_order(request.tol), run.structure.sizes), request.clock
-        now = array[0]
-        now["period"], now["last_period"] = int(at.first), int(at.last)
-        now["time"], now["end"], now["period_length"], now["tolerance"] = at.local, at.end, at.length, request.tol
-        now["piece"] = run.env[2].searchsorted(request.time, side="right") if run.env[2].size else 0
-        now["leave_by"] = request.side or 0
-        now["dense"] = int(request.dense or request.sample_times is not None)
-        now["mode"], now["side"] = _mode_and_side(request, run)
-        return cls(array, _first_state(run, request.position, request.speeds))
+        at, breaks = request.clock, run.env[2]
+        self.rows = NO_ROWS  # of several contacts
+        self.state = _first_state(run, request.start)  # coordinates, velocities, each with its tangent's columns, and shifts
+        self.array, self._memory = motion_record(taylor_order(request.tol), run.structure.sizes)  # one record MOTION
+        mode, side, leave_by = self._at_contact(request, run)
+        piece = int(breaks.searchsorted(request.time, side="right")) if breaks.size else 0
+        dense = int(request.dense or request.sample_times is not None)
+        where = (float(at.local), int(at.first), mode, side, piece, leave_by, dense)
+        AT_START.pack_into(self._memory, 0, *where, int(at.last), float(at.end), float(at.length), float(request.tol))
+
+    @property
+    def numbers(self) -> Any:
+        """The numbers of the motion as they are now, by the names of MOTION."""
+        return MotionNumbers._make(WHOLE_RECORD.unpack(self._memory))
 
     def advance(self, run: Program, steps: StepBuffers, events: EventBuffers) -> int:
         """Call the kernel; returns the `Status` with which it stops."""
         return self._kernel()(self.array, self.state, run.env, run.model, self.rows, (steps, events))
 
+    def with_empty_buffers(self) -> None:
+        """Let the kernel record from the beginning of its buffers on."""
+        self.array["recorded_steps"] = self.array["recorded_events"] = 0
+
+    def _at_contact(self, request: MotionRequest, run: Program) -> tuple[int, int, int]:
+        """The mode and the side at the start, and by which side a motion leaves that is not unique."""
+        position, speed = request.start.tolist()[:: request.start.size // 2]
+        mode, side = side_of_state(run.structure.sizes.sides, position, speed, run.model.geometry.tolist())
+        if mode == Mode.BEYOND:
+            model, name = request.system.model, request.system.model.coordinates[0]
+            raise ParameterError(f"{name} = {position:g} lies beyond the contact at {name} = {float(model.contact):g}", name)
+        return mode, side, request.side or 0
+
     def _kernel(self) -> Callable[..., int]:
         return load_kernel()
 
-    @property
-    def time(self) -> float:
-        """The dimensionless time."""
-        now = self.numbers
-        return int(now["period"]) * float(now["period_length"]) + float(now["time"])
-
-    @property
-    def end_time(self) -> float:
-        """The time at which the motion ends, unless something ends it earlier."""
-        now = self.numbers
-        return int(now["last_period"]) * float(now["period_length"]) + float(now["end"])
-
-    @property
-    def position(self) -> np.ndarray:
+    def position(self, numbers: Any) -> np.ndarray:
         """The model's own coordinates."""
-        return self.state[: self.numbers["own"]]
+        return self.state[: numbers.own]
 
-    @property
-    def velocity(self) -> np.ndarray:
+    def velocity(self, numbers: Any) -> np.ndarray:
         """Their velocities."""
-        return self.state[self.numbers["dof"] : self.numbers["dof"] + self.numbers["own"]]
+        return self.state[numbers.dof : numbers.dof + numbers.own]
 
-    @property
-    def mode(self) -> int:
-        """A `Mode`."""
-        return int(self.numbers["mode"])
-
-    @property
-    def side(self) -> int:
+    def side(self, numbers: Any) -> int:
         """+1 or -1, and 0 at rest."""
-        return 0 if self.mode in (Mode.REST, Mode.CHATTER) else int(self.numbers["side"])
+        return 0 if numbers.mode in (Mode.REST, Mode.CHATTER) else numbers.side
 
     @property
     def columns(self) -> np.ndarray:
         """The tangent's columns, (2 own coordinates, columns): the rows of the coordinates, then those of the velocities."""
-        own, shape = self.numbers["own"], (2, 1 + self.numbers["columns"], self.numbers["own"])
-        both = self.state[: 2 * self.numbers["dof"]].reshape(shape)
-        columns: np.ndarray = both[:, 1:].transpose(0, 2, 1).reshape(2 * own, -1)
+        now = self.numbers
+        both = self.state[: 2 * now.dof].reshape(2, 1 + now.columns, now.own)
+        columns: np.ndarray = both[:, 1:].transpose(0, 2, 1).reshape(2 * now.own, -1)
         return columns
 
 
-def _mode_and_side(request: MotionRequest, run: Program) -> tuple[int, int]:
-    if run.structure.several:
-        return Mode.CONTACT, 0
-    position, speed = float(request.position[0]), float(request.speeds[0])
-    mode, side = side_of_state(run.structure.sizes.sides, position, speed, run.model.geometry.tolist())
-    if mode == Mode.BEYOND:
-        model, name = request.system.model, request.system.model.coordinates[0]
-        raise ParameterError(f"{name} = {position:g} lies beyond the contact at {name} = {float(model.contact):g}", name)
-    return mode, side
+def time_of(numbers: Any) -> float:
+    """The dimensionless time of a motion with these numbers."""
+    time: float = numbers.period * numbers.period_length + numbers.time
+    return time
 
 
-def _first_state(run: Program, position: np.ndarray, speeds: np.ndarray) -> np.ndarray:
+def _first_state(run: Program, start: np.ndarray) -> np.ndarray:
     """Coordinates and velocities, each followed by the tangent's columns, and the shifts."""
-    columns = run.structure.sizes.columns
+    columns, own = run.structure.sizes.columns, start.size // 2
     if not columns:
-        return np.concatenate([position, speeds])
-    start = np.eye(columns, 2 * position.size)  # row j is the initial value of column j
-    u, z = start[:, : position.size].ravel(), start[:, position.size :].ravel()
-    return np.concatenate([position, u, speeds, z, np.zeros(columns)])
+        return start.copy()
+    unit = np.eye(columns, start.size)  # row j is the initial value of column j
+    return np.concatenate([start[:own], unit[:, :own].ravel(), start[own:], unit[:, own:].ravel(), np.zeros(columns)])
 
 
 def _parts(system: System) -> tuple[Any, Any, Any]:
@@ -136,24 +117,22 @@ def _parts(system: System) -> tuple[Any, Any, Any]:
     return parts
 
 
-@dataclass(frozen=True, eq=False)
 class ContactState(KernelState):
     """What the kernel changes; the `rows` are in the columns of `ContactColumn`, then of `FrictionColumn`."""
 
-    @classmethod
-    def at_start(cls, request: MotionRequest, run: Program) -> ContactState:
-        """The state in which a motion starts. The kernel first decides which contacts at rest at their positions stay closed.
+    def _at_contact(self, request: MotionRequest, run: Program) -> tuple[int, int, int]:
+        """Fill the rows; the kernel first decides which contacts at rest at their positions stay closed.
 
         Raises
         ------
         ParameterError
             The state lies beyond a contact, or moves into a contact that it is at.
         """
-        start = super().at_start(request, run)
-        names, position, speeds = request.system.model.coordinates, request.position.tolist(), request.speeds.tolist()
+        names, numbers = request.system.model.coordinates, request.start.tolist()
+        position, speeds = numbers[: len(names)], numbers[len(names) :]
         own_contacts, own_frictions, surfaces = _parts(request.system)
         held, rubbed = run.trace.contact_coordinates, run.trace.friction_coordinates
-        contacts = np.zeros((len(held) + len(rubbed), NO_ROWS.shape[1]), dtype=np.int64)
+        self.rows = contacts = np.zeros((len(held) + len(rubbed), NO_ROWS.shape[1]), dtype=np.int64)
         if run.trace.friction_contacts:
             contacts[len(held) :, FrictionColumn.PRESSED] = np.add(run.trace.friction_contacts, 1)
         contacts[:, ContactColumn.COORDINATE] = held + tuple(max(place, -1 - place) for place in rubbed)
@@ -167,7 +146,7 @@ class ContactState(KernelState):
             row[ContactColumn.CLOSED] = int(gap == 0.0 and rate == 0.0)
             row[ContactColumn.SKIP] = int(gap == 0.0)
             if gap == 0.0:
-                start.state[place] = float(contact.position)
+                self.state[place] = float(contact.position)
         for row, friction in zip(contacts[len(held) :], own_frictions, strict=False):
             rate = speeds[names.index(friction.coordinate)] - float(friction.ground_speed)
             row[FrictionColumn.SLIDES] = int(np.sign(rate))
@@ -175,16 +154,15 @@ class ContactState(KernelState):
             place = names.index(surface.coordinate)
             row[FrictionColumn.MARGIN] = NoMargin.SURFACE
             row[FrictionColumn.SLIDES] = int(np.sign(position[place] - float(surface.position)) or np.sign(speeds[place]) or 1)
-        start.numbers["leave_by"] = 1  # no release is recorded at the start
-        return cls(start.array, start.state, contacts)
+        return Mode.CONTACT, 0, 1  # no release is recorded at the start
 
     def _kernel(self) -> Callable[..., int]:
         return load_contacts_kernel()
 
-    @property
-    def side(self) -> int:
+    def side(self, numbers: Any) -> int:
         """1 plus the bits that `modes_of` reads: the closed contacts, and the directions in which frictions slide."""
-        return int(self.numbers["side"])
+        side: int = numbers.side
+        return side
 
 
 @dataclass(frozen=True)
@@ -209,6 +187,12 @@ def joined(chunks: list[np.ndarray]) -> np.ndarray:
     return chunks[0] if len(chunks) == 1 else np.concatenate(chunks)
 
 
+@cache
+def no_steps(rows: int, count: int) -> StepBuffers:
+    """Buffers into which the kernel writes nothing, for motions of which only the events are kept."""
+    return StepBuffers(np.empty((8, 2), dtype=np.int64), np.empty((8, 2)), np.empty((8, rows, count)))
+
+
 class Recorder:
     """Takes the contents of the kernel's buffers whenever these are full.
 
@@ -219,15 +203,11 @@ class Recorder:
     def __init__(self, request: MotionRequest, run: Program, order: int) -> None:
         self._system, self._times, self._columns = request.system, request.sample_times, run.structure.sizes.columns
         self._own, self._several = run.structure.sizes.own, run.structure.several
-        kept, wide = request.dense or request.sample_times is not None, request.dense and request.sample_times is None
-        self._wide = wide and request.dense_tangent
-        size, rows = MOST.buffer if kept else 8, self._own * (1 + self._columns if self._wide else 1)
-        self.steps = StepBuffers(np.empty((size, 2), dtype=np.int64), np.empty((size, 2)), np.empty((size, rows, order + 2)))
+        self._wide = request.dense and request.sample_times is None and request.dense_tangent
+        self._rows = self._own * (1 + self._columns if self._wide else 1), order + 2
+        self._keeps_steps = request.dense or request.sample_times is not None
         # The numbers of an event before its shifts:
         self._width = 1 + 2 * self._own + len(run.structure.signs) if self._several else 3
-        self.events = EventBuffers(
-            np.empty((MOST.buffer, 4), dtype=np.int64), np.empty((MOST.buffer, self._width + self._columns))
-        )
         self.total = 0  # events so far
         self._kept = 0  # steps so far
         self._length = float(request.clock.length)
@@ -235,20 +215,31 @@ class Recorder:
         self._events: list[tuple[np.ndarray, ...]] = []
         self._samples: list[tuple[np.ndarray, ...]] = []
         self._next = 0  # index of the first sample time that is still to come
+        periods = request.clock.last - request.clock.first if request.clock.length else request.clock.end - request.clock.local
+        self.make_buffers(min(MOST.buffer, 24 * (2 + int(periods))))
+
+    def make_buffers(self, size: int = MOST.buffer) -> None:
+        """Make empty buffers for as many steps, and events."""
+        width = self._width + self._columns
+        self.events = EventBuffers(np.empty((size, 4), dtype=np.int64), np.empty((size, width)))
+        if self._keeps_steps:
+            self.steps = StepBuffers(np.empty((size, 2), dtype=np.int64), np.empty((size, 2)), np.empty((size, *self._rows)))
+        else:
+            self.steps = no_steps(*self._rows)
 
     @cached_property
     def _check(self) -> ValidityCheck:
         return ValidityCheck(self._system)
 
-    def empty_buffers(self, numbers: Any) -> None:
-        """Empty the buffers."""
-        steps, events = int(numbers["recorded_steps"]), int(numbers["recorded_events"])
+    def take(self, numbers: Any) -> None:
+        """Take what the buffers hold."""
+        steps, events = numbers.recorded_steps, numbers.recorded_events
         if steps:
-            labels, spans, series = (a[:steps].copy() for a in self.steps)
+            labels, spans, series = [a[:steps] for a in self.steps]
+            series = series.copy() if 2 * steps < len(self.steps.step_series) else series
             self._add(DenseOutput(labels[:, 0] * self._length + spans[:, 0], spans[:, 1], labels[:, 1], series))
-        self._events.append(tuple([a[:events].copy() for a in self.events]))
+        self._events.append((self.events.event_labels[:events], self.events.event_values[:events]))
         self.total += events
-        numbers["recorded_steps"] = numbers["recorded_events"] = 0
 
     def _add(self, piece: DenseOutput) -> None:
         if self._times is None:
@@ -290,13 +281,13 @@ class Recorder:
 
     def all_events(self) -> MotionEvents:
         """All events of the motion."""
-        labels, values = (joined([chunk[i] for chunk in self._events]) for i in (0, 1))
-        times, values = labels[:, 0] * self._length + values[:, 0], values[:, : self._width]
+        labels, values = self._events[0] if len(self._events) == 1 else [joined([e[i] for e in self._events]) for i in (0, 1)]
+        values = values[:, : self._width] if self._columns else values
         if self._several:
             contacts, *others = _parts(self._system)
             names = [part.name for part in contacts], [part.name for parts in others for part in parts]
-            return ContactEvents(times, labels, values, *names)
-        return MotionEvents(times, labels, values)
+            return ContactEvents(self._length, labels, values, *names)
+        return MotionEvents(self._length, labels, values)
 
     def event_shifts(self) -> np.ndarray:
         """The shift of each event along each column of the tangent, (events, columns); nan where it is not known."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -101,12 +101,18 @@ class Motion(Result):
     kept: Samples | None
     sampled_validity: Validity | None
 
+    @classmethod
+    def of_fields(cls, **fields: Any) -> Self:
+        """A motion of all its fields. What a frozen dataclass does to set them one by one takes longer than a short motion."""
+        motion = object.__new__(cls)
+        vars(motion).update(fields)
+        return motion
+
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("_") or name == "system" or name not in self.system.model.coordinates:
-            known = () if name.startswith("_") or name == "system" else self.system.model.coordinates
+        known = () if name.startswith("_") or name == "system" else self.system.model.coordinates
+        if name not in known:
             raise AttributeError(f"a Motion has no {name!r}" + (f"; {near(name, known)}" if known else ""))
-        position = np.atleast_1d(self.position)
-        return float(position[self.system.model.coordinates.index(name)])
+        return self.position[known.index(name)] if len(known) > 1 else self.position
 
     def __repr__(self) -> str:
         names = self.system.model.coordinates

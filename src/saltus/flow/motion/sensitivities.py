@@ -234,8 +234,8 @@ def derivatives_of(request: MotionRequest, run: Program | None, progress: Progre
     shift, rates, at_end = _end_shift(followed, paths, request.periods), state_rates(motion), followed.columns
     seen, event_times = in_own_coordinates(request.given, motion), followed.shifts
     if seen is not motion:
-        start = request.given.from_gaps(float(request.time), request.position, request.speeds)
-        own = OwnColumns(request.given, paths, float(request.time), [x[:, None] for x in start])
+        start = request.given.from_gaps(request.time, *np.split(request.start, 2))
+        own = OwnColumns(request.given, paths, request.time, [x[:, None] for x in start])
         at_end, event_times = own.later(np.array([motion.time]), seen, at_end[None])[0], own.of_start(event_times)
         rates = own.rates(motion.time, rates)
     columns = at_end + np.outer(rates, shift) if shift.any() else at_end

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from operator import is_
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from saltus.checks import LIMITS, Numbers, check_memory, check_number, check_size, notice_degrees
 from saltus.errors import MotionError, ParameterError
-from saltus.flow.kernel.compiled import Program, limits_of, program
+from saltus.flow.kernel.compiled import Program, limits_of, program, taylor_order
 from saltus.flow.kernel.layout import Mode, Status
 from saltus.flow.motion.events import Stop
-from saltus.flow.motion.kernel_state import MOST, ContactState, KernelState, Recorder
+from saltus.flow.motion.kernel_state import MOST, ContactState, KernelState, Recorder, time_of
 from saltus.flow.motion.motion import Motion, in_own_coordinates
 from saltus.flow.motion.validity import DenseOutput
 from saltus.progress import Progress, silent
 from saltus.systems import System, check_system, read_start
+from saltus.taylor import structure_key
 
 # The arguments of `simulate` and `sensitivities`: a misspelt one arrives among the coordinates.
 ARGUMENTS = ("velocity", "periods", "duration", "tol", "time", "side", "stop_at", "dense", "progress")
@@ -26,8 +27,7 @@ ARGUMENTS = ("velocity", "periods", "duration", "tol", "time", "side", "stop_at"
 MOST_PERIODS = 2**53  # as many as can be counted exactly
 
 
-@dataclass(frozen=True)
-class Clock:
+class Clock(NamedTuple):
     """When motions start and end; each a number, or an array for many motions."""
 
     first: Any  # the forcing period that they start in; 0 where the load has none
@@ -72,9 +72,30 @@ def clock(time: Any, length: Any, periods: float | None, duration: float | None)
     return Clock(first, local, first + passed, end, length)
 
 
-@dataclass(frozen=True, kw_only=True)
+class MotionPlan(NamedTuple):
+    """What a request says apart from the state at its start, checked."""
+
+    asked: tuple[Any, ...]  # the arguments
+    limits: tuple[str, ...]
+    clock: Clock
+    angles: list[tuple[int, str]]  # the coordinates that are angles, each with its place
+
+
 class MotionRequest:
-    """The arguments of `simulate` as they are given, and the quantities that follow from them.
+    """The arguments of `simulate` as they are given, and the quantities that follow from them; it is not changed once it is made.
+
+    Attributes
+    ----------
+    given, system
+        The system as it was given, and in coordinates of its gaps.
+    start
+        The state in these, coordinates and then velocities, (d,).
+    limits
+        The margins that end the motion.
+    sensitivities
+        Parameters to differentiate to; None without derivatives.
+    dense_tangent
+        Whether the derivatives along a dense motion are kept too.
 
     Raises
     ------
@@ -82,57 +103,60 @@ class MotionRequest:
         An argument has no meaning.
     """
 
-    system: System
-    coordinates: Mapping[str, float]
-    velocity: Any
-    periods: float | None
-    duration: float | None
-    tol: float
-    time: float
-    side: int | None
-    stop_at: Iterable[str]
-    dense: bool
-    times: Any = None
-    sensitivities: tuple[str, ...] | None = None  # parameters to differentiate to; None without derivatives
-    dense_tangent: bool = True  # whether the derivatives along a dense motion are kept too
-    # These follow from the arguments; the system is put into coordinates of its gaps, and so are position and speeds:
-    given: System = field(init=False)  # the system as it was given
-    position: np.ndarray = field(init=False)
-    speeds: np.ndarray = field(init=False)
-    limits: tuple[str, ...] = field(init=False)  # margins that end the motion
-    clock: Clock = field(init=False)
-    sample_times: np.ndarray | None = field(init=False)
+    def __init__(
+        self,
+        *,
+        system: System,
+        coordinates: Mapping[str, float],
+        velocity: Any,
+        periods: float | None,
+        duration: float | None,
+        tol: float,
+        time: float,
+        side: int | None,
+        stop_at: Iterable[str],
+        dense: bool,
+        times: Any = None,
+        sensitivities: tuple[str, ...] | None = None,
+        dense_tangent: bool = True,
+    ) -> None:
+        check_system(system, "simulate", several_contacts=True)
+        structure_key(system)  # what a system remembers is forgotten where values that its classes read have changed
+        start = read_start(system, velocity, coordinates, NAMES[sensitivities is not None], time)
+        self.given, self.system = system, system.in_gap_coordinates
+        _, self.limits, self.clock, angles = _plan(system, (periods, duration, tol, time, side, stop_at, dense, times is None))
+        for i, name in angles:
+            notice_degrees(name, start.item(i))
+        self.time, self.tol = float(time), float(tol)
+        self.start = start if self.system is system else np.concatenate(system.to_gaps(self.time, *np.split(start, 2)))
+        self.sample_times = None if times is None else _sample_times(times, self.time)
+        self.periods, self.side, self.sensitivities = periods, side, sensitivities
+        self.dense, self.dense_tangent = dense, dense_tangent
 
-    def __post_init__(self) -> None:
-        check_system(self.system, "simulate", several_contacts=True)
-        for name, value in self._read().items():
-            object.__setattr__(self, name, value)
 
-    def _read(self) -> dict[str, Any]:
-        """The fields that follow from the arguments."""
-        arguments = (*ARGUMENTS, "times" if self.sensitivities is None else "parameters")
-        start = read_start(self.system, self.velocity, self.coordinates, arguments, self.time)
-        position, speeds = start[: start.size // 2], start[start.size // 2 :]
-        for i, name in self.system._remembered("angles", lambda: _angles(self.system)):
-            notice_degrees(name, position[i])
-        limits = limits_of(self.system, self.stop_at)
-        check_number("tol", self.tol, at_least=1e-15, at_most=1e-6)
-        check_number("time", self.time)
-        if self.side not in (None, 1, -1):
-            raise ParameterError(f"side must be +1 or -1, got {self.side!r}", "side")
-        position, speeds = self.system.to_gaps(float(self.time), position, speeds)
-        when = clock(float(self.time), self.system.load.period, self.periods, self.duration)
-        if self.dense and self.times is None:
-            _check_dense(when, self.periods, self.duration)
-        return {
-            "given": self.system,
-            "system": self.system.in_gap_coordinates,
-            "position": position,
-            "speeds": speeds,
-            "limits": limits,
-            "clock": when,
-            "sample_times": None if self.times is None else _sample_times(self.times, float(self.time)),
-        }
+def _plan(system: System, asked: tuple[Any, ...]) -> MotionPlan:
+    """The plan of a request. A system remembers the last one: in a loop the arguments are the same objects at every call, and
+    are checked once."""
+    last: list[MotionPlan] = system._remembered("plan", list)
+    for plan in last:
+        if all(map(is_, plan.asked, asked)):
+            return plan
+    periods, duration, tol, time, side, stop_at, dense, whole = asked
+    limits = limits_of(system, stop_at)
+    check_number("tol", tol, at_least=1e-15, at_most=1e-6)
+    check_number("time", time)
+    if side not in (None, 1, -1):
+        raise ParameterError(f"side must be +1 or -1, got {side!r}", "side")
+    when = clock(float(time), system.load.period, periods, duration)
+    if dense and whole:
+        _check_dense(when, periods, duration)
+    made = MotionPlan(asked, limits, when, _angles(system))
+    last[:] = [made] if isinstance(stop_at, (str, tuple)) else []  # others may change
+    return made
+
+
+# The names of the arguments, without and with derivatives: a misspelt one arrives among the coordinates.
+NAMES = (*ARGUMENTS, "times"), (*ARGUMENTS, "parameters")
 
 
 def _angles(system: System) -> list[tuple[int, str]]:
@@ -161,6 +185,7 @@ def _sample_times(given: Any, start: float) -> np.ndarray:
 
 
 WHAT = "following the motion"  # for the progress
+GOES_ON = (Status.FULL, Status.PAUSED)  # the motion, with another call of the kernel
 
 
 def simulate(
@@ -235,8 +260,7 @@ def simulate(
     return in_own_coordinates(system, follow(request, progress).motion)
 
 
-@dataclass(frozen=True, eq=False)
-class Followed:
+class Followed(NamedTuple):
     """A motion with its tangent at the end."""
 
     motion: Motion
@@ -262,28 +286,29 @@ class Followed:
 def follow(request: MotionRequest, progress: Progress, run: Program | None = None) -> Followed:
     """Follow the motion of a request, with its tangent if the request asks for one; `run` is its program, if that is known."""
     run = run or program(request.system, request.limits, request.sensitivities)
-    now = (ContactState if run.structure.several else KernelState).at_start(request, run)
-    recorder = Recorder(request, run, int(now.numbers["order"]))
-    status = _advance(request.system, run, now, recorder, progress)
-    return Followed(_collect(request, now, status, recorder), now, recorder)
+    now = (ContactState if run.structure.several else KernelState)(request, run)
+    recorder = Recorder(request, run, taylor_order(request.tol))
+    status, numbers = _advance(request, run, now, recorder, progress)
+    return Followed(_collect(request, now, status, numbers, recorder), now, recorder)
 
 
-def _advance(system: System, run: Program, now: KernelState, recorder: Recorder, progress: Progress) -> int:
-    """Call the kernel until the motion ends, emptying its buffers in between; returns why it ended."""
-    begin, end = now.time, now.end_time
-    many = MOST.burst if run.structure.several else MOST.rate
-    checked_at, counted, unit = begin, 0, min(float(now.numbers["period_length"]) or 1.0, 1.0) * many / MOST.rate
+def _advance(request: MotionRequest, run: Program, now: KernelState, recorder: Recorder, progress: Progress) -> tuple[int, Any]:
+    """Call the kernel until the motion ends, emptying its buffers in between; returns why it ended, and its numbers then."""
+    at, system, many = request.clock, request.system, MOST.burst if run.structure.several else MOST.rate
+    begin, end = at.first * at.length + at.local, at.last * at.length + at.end
+    checked_at, counted, unit = begin, 0, min(at.length or 1.0, 1.0) * many / MOST.rate
     progress(0.0, WHAT)
     while True:
         status = now.advance(run, recorder.steps, recorder.events)
-        recorder.empty_buffers(now.numbers)
-        time = now.time
+        numbers = now.numbers
+        recorder.take(numbers)
+        time = time_of(numbers)
         if end > begin:
             progress((time - begin) / (end - begin), WHAT)
-        if status not in (Status.FULL, Status.PAUSED):
+        if status not in GOES_ON:
             if status != Status.DONE:
                 _refuse(system, status, now)
-            return status
+            return status, numbers
         if recorder.total > counted + many:
             if time < checked_at + unit:
                 raise MotionError(
@@ -296,6 +321,8 @@ def _advance(system: System, run: Program, now: KernelState, recorder: Recorder,
                 f"more than {MOST.events} impacts before time {time:.6g}, too many to be kept; ask for a shorter time, or use "
                 "simulate_many, which only counts them"
             )
+        now.with_empty_buffers()
+        recorder.make_buffers()
 
 
 def _at_contacts(system: System, recorder: Recorder) -> str:
@@ -319,7 +346,8 @@ def _why_so_many(system: System, recorder: Recorder) -> str:
 
 def _refuse(system: System, status: int, now: KernelState) -> None:
     """Raise an error, with a sentence, for a status that is no regular end of a motion."""
-    sentence = refusal(system, status, f"{now.time:.9g}", f"{now.velocity[0]:.6g}")
+    numbers = now.numbers
+    sentence = refusal(system, status, f"{time_of(numbers):.9g}", f"{now.velocity(numbers)[0]:.6g}")
     if sentence is not None:
         raise MotionError(sentence)
 
@@ -359,28 +387,29 @@ def refusal(system: System, status: int, time: str, velocity: str) -> str | None
     return None
 
 
-def _collect(request: MotionRequest, now: KernelState, status: int, recorder: Recorder) -> Motion:
+def _collect(request: MotionRequest, now: KernelState, status: int, numbers: Any, recorder: Recorder) -> Motion:
     """The motion from the kernel's last state and its records."""
-    events, time, position, velocity, side = recorder.all_events(), now.time, now.position, now.velocity, now.side
-    numbers, one, start = now.numbers, position.size == 1, float(request.time)
-    stop, limit = (Stop.REST if now.mode == Mode.REST else Stop.HORIZON), None
+    events, start = recorder.all_events(), request.time
+    time, position, velocity, side = time_of(numbers), now.position(numbers), now.velocity(numbers), now.side(numbers)
+    one, mode = position.size == 1, numbers.mode
+    stop, limit = (Stop.REST if mode == Mode.REST else Stop.HORIZON), None
     if status == Status.LIMITED:
         stop, limit = Stop.LIMIT, request.limits[events.details[-1]]
     if status == Status.STALLED:
         stop, limit = Stop.SINGULAR, request.system.model.singularity  # `_refuse` lets no other motion stall
     samples = None if request.sample_times is None else recorder.samples(time, position, velocity, side)
-    return Motion(
+    return Motion.of_fields(
         system=request.system,
-        tol=float(request.tol),
+        tol=request.tol,
         start=start,
         time=time,
-        position=float(position[0]) if one else tuple(position.tolist()),
-        velocity=float(velocity[0]) if one else tuple(velocity.tolist()),
+        position=position.item() if one else tuple(position.tolist()),
+        velocity=velocity.item() if one else tuple(velocity.tolist()),
         side=side,
         stop=stop,
         limit=limit,
-        chatter_speed=float(numbers["chatter_speed"]) if now.mode == Mode.CHATTER else None,
-        periods=int(numbers["period"]),
+        chatter_speed=numbers.chatter_speed if mode == Mode.CHATTER else None,
+        periods=numbers.period,
         events=events,
         dense=recorder.dense(),
         kept=samples,
