@@ -108,6 +108,22 @@ def test_a_structure_with_other_numbers_is_not_traced_anew() -> None:
     assert key(0.02, STOP) != key(0.02, STOP, SOFT_WALL)
 
 
+@pytest.mark.parametrize("coupled", [False, True])
+def test_a_structure_of_another_size_has_the_same_code(coupled: bool) -> None:
+    from saltus.flow.kernel.compiled import structure_functions
+    from saltus.taylor.generated import functions_text
+    from saltus.taylor.tracing import trace
+
+    def code(size: int) -> str:
+        given = chain(size)
+        if coupled:
+            given["damping"][0, 0] += 1.0  # no combination of mass and stiffness, so that it couples the modes
+        model = saltus.Structure(**given, contacts=[STOP], surfaces=[SOFT], forces={"drive": 0})
+        return functions_text(structure_functions(trace(saltus.System(model=model, load=LOAD))))
+
+    assert code(4) == code(9)
+
+
 SOFT_WALL = saltus.Contact(name="wall", coordinate=0, position=-2.0)
 
 

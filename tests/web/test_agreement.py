@@ -108,7 +108,16 @@ def cells(rng):
     return System(model=model, load=load, impact=law), {"lower_1": 0.2, "upper_1": 0.0, "lower_2": 0.1, "upper_2": 0.0}
 
 
-KINDS = (cell, inelastic_cell, wall, block, recorded, stops, pair, belt, layers, cells)
+def masses(rng):
+    stiffness = 2.0 * np.eye(4) - np.eye(4, k=1) - np.eye(4, k=-1)
+    stop = saltus.Contact(name="stop", coordinate=3, position=rng.uniform(0.1, 0.5), sign=-1)
+    model = saltus.Structure(
+        mass=np.eye(4), damping=0.05 * stiffness, stiffness=stiffness, contacts=[stop], forces={"force": 0}, names=tuple("abcd")
+    )
+    return System(model=model, load=shaken(rng, "force"), impact=saltus.NewtonImpact(e=rng.uniform(0.3, 0.9))), {"d": 0.0}
+
+
+KINDS = (cell, inelastic_cell, wall, block, recorded, stops, pair, belt, layers, cells, masses)
 
 
 def length_of(system):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections import UserDict
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -189,6 +190,29 @@ class NamedParts(Factors):
     """NamedParts of a model with names of their own, whose numbers have paths such as `model.contacts.tip.position`."""
 
     __slots__ = ()
+
+
+class RowNumbers(tuple[float, ...]):
+    """The coefficients of all rows of the matrices."""
+
+    __slots__ = ()
+
+    @property
+    def structure_key(self) -> Any:
+        """What of it belongs to a system's structure: that it is there."""
+        return RowNumbers
+
+
+class Vectors(UserDict[str, RowNumbers]):
+    """Rows by their names, which do not change."""
+
+    def __hash__(self) -> int:
+        return hash(tuple(self.items()))
+
+    @property
+    def structure_key(self) -> Any:
+        """What of them belongs to a system's structure: their names."""
+        return Vectors, tuple(self)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,12 +9,12 @@ impact changes no velocity but those of b, and what contacts hold is held withou
 
     z'' = g_z f(t) - w^2 z - D_z z' - K_zb b - D_zb b',    M_b b'' = g_b f(t) - K_b b - D_b b' - K_bz z - D_bz z' + reactions.
 
-All numbers of these equations are data of the compiled code, none is part of it.
+All numbers of these equations are data of the compiled code, none is part of it; neither is the number of modes, each of which
+has a record of its coefficients.
 """
 
 from __future__ import annotations
 
-from collections import UserDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
@@ -25,37 +25,13 @@ import numpy as np
 from saltus.checks import check_number
 from saltus.errors import ParameterError, near, shown
 from saltus.systems.contact_model import Contact, ContactModel, Friction, Surface, is_zero
-from saltus.systems.impact_laws import Coefficients, NamedParts
+from saltus.systems.impact_laws import Coefficients, NamedParts, RowNumbers, Vectors
 from saltus.systems.model import Count
 from saltus.systems.record_files import ConstantNumbers, check_independent, check_matrices, matrices_in, read_array
 
-Matrix = ConstantNumbers
 MODE = "mode_"  # begins the names of the amplitudes
 # The names of the arrays in files, and what they are called in papers.
 IN_FILES = {"mass": ("mass", "M"), "stiffness": ("stiffness", "K"), "damping": ("damping", "C", "D")}
-
-
-class RowNumbers(tuple[float, ...]):
-    """The coefficients of all rows of the matrices."""
-
-    __slots__ = ()
-
-    @property
-    def structure_key(self) -> Any:
-        """What of it belongs to a system's structure: that it is there."""
-        return RowNumbers
-
-
-class Vectors(UserDict[str, RowNumbers]):
-    """Rows by their names, which do not change."""
-
-    def __hash__(self) -> int:
-        return hash(tuple(self.items()))
-
-    @property
-    def structure_key(self) -> Any:
-        """What of them belongs to a system's structure: their names."""
-        return Vectors, tuple(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,14 +44,34 @@ class Modes:
     damping: np.ndarray | None  # T' C T; None without damping
     coupled: bool  # whether damping couples the modes
     forces: np.ndarray  # T' g, a column for each channel
+    inverse: np.ndarray  # of T: R, and T_z' M
 
     def coefficients(self) -> list[float]:
-        """All numbers of the equations, in the order in which `Equations` reads them."""
+        """The numbers of the local equations, in the order in which `Equations` reads them; without any, those of the modes."""
         m = len(self.mass)
-        found = [self.mass, self.stiffness[:m], np.diag(self.stiffness)[m:]]
-        if self.damping is not None:
-            found += [self.damping[:m], self.damping[m:, :m], self.damping[m:, m:] if self.coupled else np.diag(self.damping)[m:]]
-        return [float(x) for block in (*found, self.forces) for x in block.ravel()]
+        damped = [] if self.damping is None else [self.damping[:m, :m]]
+        found = [self.mass, self.stiffness[:m, :m], *damped, self.forces[:m], *([] if m else [self.records()])]
+        return [float(x) for block in found for x in block.ravel()]
+
+    def records(self) -> np.ndarray:
+        """The number of modes, a record for each of them in the order of `ModeRecord`, and D by rows where it couples them."""
+        m, damping = len(self.mass), self.damping
+        found = [np.diag(self.stiffness)[m:, None], self.stiffness[m:, :m], self.forces[m:]]
+        if damping is not None:
+            found += [np.diag(damping)[m:, None], damping[:m, m:].T, damping[m:, :m]]
+        among = damping[m:, m:].ravel() if damping is not None and self.coupled else np.zeros(0)
+        return np.concatenate([[len(found[0])], np.hstack(found).ravel(), among])
+
+
+class ModeRecord:
+    """The places in a mode's record, for m local displacements and some channels."""
+
+    def __init__(self, m: int, channels: int, damped: bool) -> None:
+        self.square, self.stiffness, self.forces = 0, range(1, 1 + m), range(1 + m, 1 + m + channels)
+        at = 1 + m + channels
+        self.damping = at if damped else None
+        self.local_damping, self.by_local = range(at + 1, at + 1 + m), range(at + 1 + m, at + 1 + 2 * m)
+        self.size = at + (1 + 2 * m if damped else 0)
 
 
 @lru_cache(maxsize=64)
@@ -104,7 +100,8 @@ def modes_of(
     damped = None if damping is None else basis.T @ damping.array @ basis
     among = np.zeros((0, 0)) if damped is None else damped[count:, count:]
     coupled = np.abs(among - np.diag(np.diag(among))).max(initial=0.0) > rounding * np.abs(among).max(initial=0.0)
-    return Modes(basis, local, basis.T @ k @ basis, damped, bool(coupled), basis.T @ forces.array)
+    inverse = np.vstack([r, shapes.T @ m])  # as T' M T is block-diagonal
+    return Modes(basis, local, basis.T @ k @ basis, damped, bool(coupled), basis.T @ forces.array, inverse)
 
 
 class Equations:
@@ -114,12 +111,15 @@ class Equations:
         local, self.damped, self.coupled, _ = structure.form
         self._numbers, self._at = structure.coefficients, 0
         self.local, self.size = len(local), len(structure.names)
-        m, n = self.local, self.size
-        self.mass, self.stiffness, self.squares = self._block(m, m), self._block(m, n), self._block(1, n - m)[0]
-        if self.damped:
-            self.local_damping, self.damping_by_local = self._block(m, n), self._block(n - m, m)
-            self.damping = self._block(n - m, n - m if self.coupled else 1)
-        self.forces = self._block(n, len(structure.forces))
+        m, modes, channels = self.local, len(structure.names) - len(local), len(structure.forces)
+        self.mass, self.stiffness = self._block(m, m), self._block(m, m)
+        self.damping, self.forces = self._block(m, m) if self.damped else [], self._block(m, channels)
+        self.record = ModeRecord(m, channels, self.damped)
+        if m:
+            self._numbers, self._at = structure.records.array, 0
+        self._at += 1
+        self.records = self._block(modes, self.record.size)
+        self.among = self._block(modes, modes) if self.coupled else []
 
     def _block(self, rows: int, columns: int) -> list[Any]:
         start, self._at = self._at, self._at + rows * columns
@@ -152,7 +152,7 @@ class Structure(ContactModel):
         Sums of displacements by their names: the coefficients of all rows, (n,), or of some, {0: 1.0, "x5": -1.0}; or one row.
     names
         The names of the rows, by default x0, x1, ...
-    coefficients, form
+    coefficients, records, form
         Computed from the others and not to be given: the numbers of the equations, and which there are.
 
     Raises
@@ -186,7 +186,8 @@ class Structure(ContactModel):
     forces: Any = None
     points: Any = None
     names: tuple[str, ...] = ()
-    coefficients: Any = None  # of the equations, which follow from the matrices
+    coefficients: Any = None  # of the local equations, which follow from the matrices
+    records: Any = None  # those of the modes; without local displacements they are among the coefficients
     form: Any = None  # which blocks of numbers the equations have, and the names of the local displacements; follows too
 
     def __post_init__(self) -> None:
@@ -201,17 +202,18 @@ class Structure(ContactModel):
             for field, kind in (("contacts", Contact), ("surfaces", Surface), ("friction", Friction))
         }
         local = dict.fromkeys(part.coordinate for each in parts.values() for part in each)
-        rows = np.array([points.get(name) or _unit(names, name) for name in local]).reshape(len(local), len(names))
+        rows = np.array([points.get(name) or _vector(name, names, name) for name in local]).reshape(len(local), len(names))
         check_independent(rows, tuple(local))
         columns = np.array([*forces.values()]).reshape(len(forces), len(names)).T
         modes = modes_of(mass, stiffness, damping, ConstantNumbers(rows, "points"), ConstantNumbers(columns, "forces"))
         pattern = tuple(tuple(bool(x) for x in row) for row in modes.mass)
         made = {"mass": mass, "stiffness": stiffness, "damping": damping, "file": "", "names": names, **parts}
         made |= {"forces": Vectors(forces), "points": Vectors(points), "coefficients": Coefficients(modes.coefficients())}
+        made |= {"records": ConstantNumbers(modes.records(), "records")}
         made |= {"form": (tuple(local), modes.damping is not None, modes.coupled, pattern)}
         for name, value in made.items():
             object.__setattr__(self, name, value)
-        object.__setattr__(self, "_basis", modes.basis)
+        object.__setattr__(self, "_modes", modes)
 
     @property
     def coordinates(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -260,43 +262,48 @@ class Structure(ContactModel):
         """The forces on the local displacements and on the modes, without reactions and frictions."""
         own = Equations(self)
         q, v = (list(x) if own.size > 1 else [x] for x in (theta, velocity))
-        m, size = own.local, len(q)
+        m, places, records = own.local, own.record, own.records
         pushes = [getattr(load, name)(t) for name in self.forces]
-        found = [_sum(own.forces[i], pushes) for i in range(size)]
+        found = [_sum(own.forces[i], pushes) for i in range(m)]
         for i in range(m):
-            found[i] = found[i] - _sum(own.stiffness[i][:size], q)
+            found[i] = found[i] - _sum(own.stiffness[i], q[:m])
             if own.damped:
-                found[i] = found[i] - _sum(own.local_damping[i][:size], v)
-            if size < own.size:
-                rates = own.local_damping[i][m:] if own.damped else None
-                found[i] = found[i] - theta.sum_over_modes(own.stiffness[i][m:], rates)
-        for i in range(m, size):
-            across = _sum([row[i] for row in own.stiffness], q[:m])
-            found[i] = found[i] - own.squares[i - m] * q[i] - across
+                found[i] = found[i] - _sum(own.damping[i], v[:m])
+            if len(q) < own.size:
+                found[i] = found[i] - theta.sum_over_modes(places.stiffness[i], places.local_damping[i] if own.damped else None)
+            else:
+                found[i] = found[i] - _sum([record[places.stiffness[i]] for record in records], q[m:])
+                if own.damped:
+                    found[i] = found[i] - _sum([record[places.local_damping[i]] for record in records], v[m:])
+        for i, record in enumerate(records if len(q) == own.size else []):
+            pushed = _sum([record[k] for k in places.forces], pushes)
+            found.append(pushed - record[places.square] * q[m + i] - _sum([record[k] for k in places.stiffness], q[:m]))
             if own.damped:
-                row, rates = own.damping[i - m], v[m:] if own.coupled else [v[i]]
-                found[i] = found[i] - _sum(row, rates) - _sum(own.damping_by_local[i - m], v[:m])
+                slowed = _sum(own.among[i], v[m:]) if own.coupled else record[places.damping] * v[m + i]
+                found[-1] = found[-1] - slowed - _sum([record[k] for k in places.by_local], v[:m])
         for surface in self.surfaces:
             i, side = self.form[0].index(surface.coordinate), sides[0][surface.name]
             pressed = surface.stiffness * (q[i] - surface.position) + surface.damping * v[i]
             found[i] = found[i] - 0.5 * (1.0 + side) * pressed
         return found[0] if own.size == 1 else tuple(found)
 
-    def mode_equations(self, t: Any, theta: Any, velocity: Any, load: Any) -> tuple[Any, Any, list[tuple[Any, Any, int, float]]]:
-        """w^2 and D of the modes; their inputs, each with its first coefficient, the step to that of the next mode, a sign.
+    def mode_equations(
+        self, t: Any, theta: Any, velocity: Any, load: Any
+    ) -> tuple[ModeRecord, bool, list[tuple[Any, int, float]]]:
+        """The places in a mode's record, whether D couples modes, and the modes' inputs, each with its coefficient's place and a
+        sign.
 
         Parameters
         ----------
         t, theta, velocity, load
             The time, the local displacements, their rates, and the load, as `force` takes them.
         """
-        own, found = Equations(self), list[tuple[Any, Any, int, float]]()
-        m, channels = own.local, list(self.forces)
-        found += [(x, own.stiffness[i][m], 1, -1.0) for i, x in enumerate(theta)]
+        own = Equations(self)
+        places, found = own.record, [(x, k, -1.0) for x, k in zip(theta, own.record.stiffness, strict=True)]
         if own.damped:
-            found += [(x, own.damping_by_local[0][i], m, -1.0) for i, x in enumerate(velocity)]
-        found += [(getattr(load, name)(t), own.forces[m][k], len(channels), 1.0) for k, name in enumerate(channels)]
-        return own.squares, [x for row in own.damping for x in row] if own.damped else None, found
+            found += [(x, k, -1.0) for x, k in zip(velocity, places.by_local, strict=True)]
+        found += [(getattr(load, name)(t), k, 1.0) for name, k in zip(self.forces, places.forces, strict=True)]
+        return places, own.coupled, found
 
     def kinetic_energy(self, t: Any, theta: Any, velocity: Any, side: Any, load: Any) -> Any:
         """u' M u' / 2 of the velocities u."""
@@ -316,7 +323,7 @@ class Structure(ContactModel):
         given = np.asarray(of, dtype=float)
         if given.shape[:1] != (len(self.names),):
             raise ParameterError(f"displacements takes {len(self.names)} coordinates along the first axis, got {shown(of)}", "of")
-        return np.asarray(vars(self)["_basis"] @ given)
+        return np.asarray(vars(self)["_modes"].basis @ given)
 
     def start(self, displacement: Any = 0.0, velocity: Any = 0.0) -> dict[str, Any]:
         """The state with these displacements u and velocities u', by the names of the arguments of `simulate`.
@@ -329,7 +336,7 @@ class Structure(ContactModel):
         found = []
         for name, given in (("displacement", displacement), ("velocity", velocity)):
             vector = _vector(np.full(len(self.names), given) if np.ndim(given) == 0 else given, self.names, name)
-            found.append([float(x) for x in np.linalg.solve(vars(self)["_basis"], vector)])
+            found.append([float(x) for x in vars(self)["_modes"].inverse @ vector])
         local = [self.names.index(name) if name in self.names else None for name in self.form[0]]
         for values, given in zip(found, (displacement, velocity), strict=True):
             for i, row in enumerate(local):  # exactly as given, so that what is at a contact is there
@@ -399,11 +406,6 @@ def _place(key: Any, names: tuple[str, ...], where: str) -> int:
     if key not in names:
         raise ParameterError(f"{where}: no row is called {shown(key)}; {near(str(key), names)}", where)
     return names.index(key)
-
-
-def _unit(names: tuple[str, ...], name: str) -> RowNumbers:
-    """The row with which a displacement of the structure's own is local."""
-    return RowNumbers(float(other == name) for other in names)
 
 
 def _each(given: Any, field: str) -> Sequence[Any]:

@@ -18,7 +18,7 @@ from saltus.taylor.rules import FUNCTIONS
 POINTWISE = ("greater", "less", "greater_equal", "less_equal", "where", "maximum", "minimum")
 LEAVES = (
     *("number", "parameter", "time", "origin", "side", "free", "slide", "coordinate", "velocity", "acceleration", "record"),
-    *("form", "mode"),  # sums over modes, and the accelerations of modes (see `memory.py`)
+    *("form", "mode", "datum"),  # sums over modes, accelerations of modes, and coefficients of both (see `memory.py`)
 )
 RECORD_WIDTH = 5  # coefficients of a record's piece: a cubic spline of velocity makes a quartic displacement
 

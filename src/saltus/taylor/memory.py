@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -134,6 +134,12 @@ class Memory:
         loaded.align = 8
         return loaded
 
+    def whole(self, pointer: Any) -> Any:
+        """LLVM's whole number of the number behind a pointer, the same in all lanes."""
+        loaded = self.load_from(pointer)
+        first = loaded if self.arithmetic.width == 1 else self.builder.extract_element(loaded, LONG(0))
+        return self.builder.fptosi(first, LONG)
+
     def store(self, place: Place, value: Vec | float | None) -> None:
         """Put a number into an array."""
         self.builder.store(self.value(value), self.pointer(place)).align = 8
@@ -197,39 +203,30 @@ class Memory:
 
 # --- many modes, whose equations are written as loops (`ModeLoops` in `rules.py`) --------------------------------------------
 
-# The modes of a linear structure obey, with coefficients that are parameters,
+# The modes of a linear structure obey
 #
 #     z_i'' = -w_i^2 z_i - sum_j D_ij z_j' + sum_r c_ri s_r,
 #
 # where the inputs s_r are other coordinates, their rates, or expressions such as loads. The other coordinates read of them the
 # sums sum_i k_i z_i + d_i z_i', the leaves "form" of their expressions. The columns of a tangent obey the same equations.
+#
+# The coefficients are numbers behind the constants, the leaves "datum": the number of modes, a record for each mode, and the rows
+# of D where it couples modes. The code reads the number of modes there, and is the same for any number.
 
 
 class ModeSum(NamedTuple):
-    """A sum over modes: where the coefficients of their amplitudes and of their rates begin among the parameters."""
+    """A sum over modes, by the places in their records of the coefficients of their amplitudes and of their rates."""
 
     amplitudes: int
     rates: int | None  # None: the sum has none
     first: int  # the coordinate that is the first mode, of the motion or of a column of its tangent
-    count: int  # type: ignore[assignment]  # of modes; a tuple has a method of this name
-
-    def written_out(self) -> Expr:
-        """The sum as an expression."""
-        total = number(0.0)
-        for start, op in ((self.amplitudes, "coordinate"), (self.rates, "velocity")):
-            for i in range(self.count):
-                if start is None:
-                    break
-                total = total + Expr("parameter", (), start + i) * Expr(op, (), self.first + i)
-        return total
 
 
 class ModeInput(NamedTuple):
-    """An input of all modes: sign times coefficients, which are parameters, times a coordinate, a rate or an expression."""
+    """An input of all modes: a sign, coefficients at a place in their records, and a coordinate, a rate or an expression."""
 
     of: Expr
-    start: int
-    stride: int
+    place: int
     sign: float
 
     @property
@@ -243,10 +240,11 @@ class ModeBlock:
     """The modes of a traced structure."""
 
     first: int  # the coordinate that is the first of them
-    count: int
-    squares: int  # where w^2 begins among the parameters
-    damping: int | None  # where D begins
-    coupled: bool  # whether D has rows, or its diagonal alone
+    count: int = field(repr=False)  # a number of the code's memory, so that it is no part of its text
+    square: int  # the place of w^2 in a record
+    damping: int | None  # that of D's diagonal
+    record: int  # how many numbers a record has
+    coupled: bool  # whether D has rows, behind the records, or its diagonal alone
     forms: tuple[ModeSum, ...]
     inputs: tuple[ModeInput, ...]
     columns: tuple[tuple[ModeInput, ...], ...] = ()  # of each column of the tangent, besides the inputs that are local
@@ -257,6 +255,11 @@ class ModeBlock:
         return self.first + self.count
 
     @property
+    def data(self) -> int:
+        """How many numbers there are."""
+        return 1 + self.record * self.count + (self.count**2 if self.coupled else 0)
+
+    @property
     def expressions(self) -> list[Expr]:
         """The inputs that are expressions, of the motion and then of the columns."""
         return [each.of for each in (*self.inputs, *(x for column in self.columns for x in column)) if not each.local]
@@ -265,17 +268,40 @@ class ModeBlock:
         """The acceleration at a place among all coordinates, those of the columns included, as an expression."""
         column, own = divmod(place, self.dof)
         base, i = column * self.dof, own - self.first
-        total = -(Expr("parameter", (), self.squares + i) * Expr("coordinate", (), place))
-        if self.damping is not None:
-            for k in range(self.count) if self.coupled else [i]:
-                at = self.damping + (i * self.count + k if self.coupled else i)
-                total = total - Expr("parameter", (), at) * Expr("velocity", (), base + self.first + k)
+        total = -(self._datum(i, self.square) * Expr("coordinate", (), place))
+        if self.damping is not None and not self.coupled:
+            total = total - self._datum(i, self.damping) * Expr("velocity", (), place)
+        for k in range(self.count if self.coupled else 0):
+            total = total - self._datum(self.count, i * self.count + k) * Expr("velocity", (), base + self.first + k)
         for each in (*self.inputs, *(self.columns[column - 1] if column else ())):
             if column and not each.local and each in self.inputs:
                 continue
             of = Expr(each.of.op, (), base + each.of.value) if each.local else each.of
-            total = total + each.sign * (Expr("parameter", (), each.start + each.stride * i) * of)
+            total = total + each.sign * (self._datum(i, each.place) * of)
         return total
+
+    def sum_written_out(self, form: ModeSum) -> Expr:
+        """A sum over modes as an expression."""
+        total = number(0.0)
+        for place, op in ((form.amplitudes, "coordinate"), (form.rates, "velocity")):
+            for i in range(self.count if place is not None else 0):
+                total = total + self._datum(i, place or 0) * Expr(op, (), form.first + i)
+        return total
+
+    def _datum(self, mode: int, place: int) -> Expr:
+        return Expr("datum", (), 1 + mode * self.record + place)
+
+
+@dataclass(frozen=True)
+class ModeRows:
+    """Where the series of modes lie: the places of the first coordinate's, and how many columns have accelerations kept."""
+
+    block: ModeBlock
+    positions: tuple[str, int]
+    velocities: tuple[str, int]
+    accelerations: tuple[str, int]
+    columns: int  # of the tangent
+    kept: int  # 1 + the number of columns whose accelerations are kept
 
 
 class LocalPart(tuple[Expr, ...]):
@@ -284,9 +310,9 @@ class LocalPart(tuple[Expr, ...]):
     first: int  # the coordinate that is the first mode
     sums: list[ModeSum]
 
-    def sum_over_modes(self, amplitudes: Any, rates: Any = None) -> Expr:
-        """The sum over modes of coefficients, which are parameters that follow one another, times amplitudes and rates."""
-        form = ModeSum(amplitudes[0].value, None if rates is None else rates[0].value, self.first, len(amplitudes))
+    def sum_over_modes(self, amplitudes: int, rates: int | None = None) -> Expr:
+        """The sum over modes of coefficients, at places in their records, times amplitudes and rates."""
+        form = ModeSum(amplitudes, rates, self.first)
         self.sums += [] if form in self.sums else [form]
         return Expr("form", (), form)
 
@@ -299,14 +325,12 @@ def local_parts(q: Any, v: Any, local: int) -> tuple[LocalPart, LocalPart]:
     return parts
 
 
-def mode_block(equations: Any, first: int, sums: Sequence[ModeSum]) -> ModeBlock:
-    """The modes from what a model answers to `mode_equations`, whose coefficients are parameters."""
-    squares, damping, given = equations
-    inputs = [ModeInput(combine("add", of, 0.0), start.value, stride, sign) for of, start, stride, sign in given]
+def mode_block(equations: Any, first: int, count: int, sums: Sequence[ModeSum]) -> ModeBlock:
+    """The modes from what a model answers to `mode_equations`."""
+    places, coupled, given = equations
+    inputs = [ModeInput(combine("add", of, 0.0), place, sign) for of, place, sign in given]
     known = tuple(each for each in inputs if each.of is not number(0.0))
-    coupled = damping is not None and len(damping) > len(squares)
-    place = None if damping is None else damping[0].value
-    return ModeBlock(first, len(squares), squares[0].value, place, coupled, tuple(sums), known)
+    return ModeBlock(first, count, places.square, places.damping, places.size, coupled, tuple(sums), known)
 
 
 def without_modes(root: Expr, block: ModeBlock) -> Expr:
@@ -314,7 +338,7 @@ def without_modes(root: Expr, block: ModeBlock) -> Expr:
     leaves: dict[Expr, Any] = {}
     for node in ordered([root]):
         if node.op == "form":
-            leaves[node] = node.value.written_out()
+            leaves[node] = block.sum_written_out(node.value)
         if node.op == "mode":
             leaves[node] = block.written_out(node.value)
     return substitute(root, leaves) if leaves else root

@@ -193,30 +193,20 @@ class InnerLoop:
             variable.add_incoming(value, self.block)
 
 
-@dataclass(frozen=True)
-class ModeRows:
-    """Where the series of modes lie: the places of the first coordinate's, and how many columns have accelerations kept."""
-
-    block: Any  # the `ModeBlock`
-    positions: tuple[str, int]
-    velocities: tuple[str, int]
-    accelerations: tuple[str, int]
-    columns: int  # of the tangent
-    kept: int  # 1 + the number of columns whose accelerations are kept
-
-
 class ModeLoops:
     """Writes the loops over modes at each order of a series."""
 
-    def __init__(self, series: Any, rows: ModeRows, inputs: list[Any]) -> None:
+    def __init__(self, series: Any, rows: Any, inputs: list[Any]) -> None:
         self.series, self.rows, self.block, self.b = series, rows, rows.block, series.builder
-        self._carried: list[Vec] = []
+        self._carried: list[list[Vec]] = []
         self._inputs = dict(zip(self.block.expressions, inputs, strict=True))  # their rows
         memory = series.memory
         self._rows = [memory.pointer(place) for place in (rows.positions, rows.velocities, rows.accelerations)]
         array = memory.arguments[rows.positions[0]]
         self._stride = LONG(series.layout.capacity) if len(array.shape) == 1 else array.shape[1]
-        self._parameters = memory.pointer(memory.leaves["parameter"])
+        self._data = memory.pointer(memory.leaves["datum"])
+        self._count = memory.whole(self._data)
+        self._dof = self.b.add(LONG(self.block.first), self._count)
         with self.b.goto_entry_block():
             self._sums = self.b.alloca(self._one.value.type, max(1, len(self.block.forms) * (1 + rows.columns)))
         self._sums.align = min(CACHE_LINE, 8 * memory.arithmetic.width)
@@ -227,27 +217,37 @@ class ModeLoops:
         for which, kind in enumerate(("coordinate", "velocity")):
             if kind in leaves:
                 given = self.series.memory.pointer(leaves[kind])
-                for base in range(0, (1 + self.rows.columns) * self.block.dof, self.block.dof):
-                    with self._loop(0, self.block.count) as i:
-                        row = self.b.add(LONG(base + self.block.first), i)
+                with self._loop(0, 1 + self.rows.columns) as j:
+                    first = self.b.add(self.b.mul(j, self._dof), LONG(self.block.first))
+                    with self._loop(0, self._count) as i:
+                        row = self.b.add(first, i)
                         self._store(self._place(which, row, LONG(0)), self._load(self.b.gep(given, [row])))
 
     def sums(self) -> None:
-        """Compute all sums over modes at this order."""
+        """Compute all sums over modes at order 0; those of the next orders come with the modes' coefficients (`_columns`)."""
         forms, b = self.block.forms, self.b
-        if not forms:
+        if not forms or not self.series.starts:
             return
         with self._loop(0, 1 + self.rows.columns) as j:
-            base = b.add(b.mul(j, LONG(self.block.dof)), LONG(self.block.first))
-            for f, form in enumerate(forms):
-                parts = [(0, form.amplitudes)] + ([] if form.rates is None else [(1, form.rates)])
-                total = self._total(form.count, [(which, start, base) for which, start in parts])
-                self._store(b.gep(self._sums, [b.add(b.mul(j, LONG(len(forms))), LONG(f))]), total)
+            base = b.add(b.mul(j, self._dof), LONG(self.block.first))
+            for f in range(len(forms)):
+                parts = [(w, lambda i, at=place: self._datum(i, at), base) for g, w, place in self._parts if g == f]
+                self._store(self._sum_of(j, f), self._total(parts))
 
     def value(self, form: Any) -> Vec:
         """One of these sums."""
         column, own = (form.first - self.block.first) // self.block.dof, form._replace(first=self.block.first)
         return self._load(self.b.gep(self._sums, [LONG(column * len(self.block.forms) + self.block.forms.index(own))]))
+
+    @property
+    def _parts(self) -> list[tuple[int, int, int]]:
+        """The parts of the sums: the number of the sum, of amplitudes (0) or rates (1), and the place of the coefficient."""
+        given = [(f, which, form[which]) for f, form in enumerate(self.block.forms) for which in (0, 1)]
+        return [(f, which, place) for f, which, place in given if place is not None]
+
+    def _sum_of(self, column: Any, f: int) -> Any:
+        """LLVM's pointer to a sum of a column."""
+        return self.b.gep(self._sums, [self.b.add(self.b.mul(column, LONG(len(self.block.forms))), LONG(f))])
 
     def advance(self) -> None:
         """Compute the accelerations of all modes at this order, and integrate them."""
@@ -261,7 +261,7 @@ class ModeLoops:
         self._columns(begin, 1 + self.rows.columns, [])
 
     def _columns(self, begin: int, end: int, more: list[Any]) -> None:
-        """The modes of some columns, with inputs that are expressions."""
+        """The modes of some columns, with inputs that are expressions, and the sums over their coefficients of the next order."""
         if begin >= end:
             return
         b, block, series = self.b, self.block, self.series
@@ -269,7 +269,7 @@ class ModeLoops:
         given = [(each, self._lifted(value)) for each, value in values if value is not None]
         inverse = series._divided(self._one, 1)
         with self._loop(begin, end) as j:
-            base = b.mul(j, LONG(block.dof))
+            base = b.mul(j, self._dof)
             local = [
                 (
                     each,
@@ -279,23 +279,30 @@ class ModeLoops:
                 if each.local
             ]
             first = b.add(base, LONG(block.first))
-            with self._loop(0, block.count) as i:
+            with self._loop(0, self._count, len(self._parts)) as (i, before):
                 row = b.add(first, i)
                 amplitude, rate = (self._load(self._place(which, row, self._order)) for which in (0, 1))
-                total = -(self._parameter(LONG(block.squares), i) * amplitude)
-                if block.damping is not None and block.coupled:
-                    start = b.add(LONG(block.damping), b.mul(i, LONG(block.count)))
-                    total = total - self._total(block.count, [(1, start, first)])
+                total = -(self._datum(i, block.square) * amplitude)
+                if block.coupled:
+                    start = b.add(b.mul(self._count, LONG(block.record)), b.mul(i, self._count))
+                    total = total - self._total([(1, lambda k: self._at(b.add(start, k)), first)])
                 elif block.damping is not None:
-                    total = total - self._parameter(LONG(block.damping), i) * rate
+                    total = total - self._datum(i, block.damping) * rate
                 for each, value in (*given, *local):
-                    factor = self._parameter(LONG(each.start), b.mul(i, LONG(each.stride)))
+                    factor = self._datum(i, each.place)
                     total = factor.fma(value if each.sign > 0.0 else -value, total)
                 if begin < self.rows.kept:
                     self._store(self._place(2, row, self._order), total)
-                following = b.add(self._order, LONG(1))
-                self._store(self._place(1, row, following), total * inverse)
-                self._store(self._place(0, row, following), rate * inverse)
+                following, new = b.add(self._order, LONG(1)), (rate * inverse, total * inverse)
+                for which in (1, 0):
+                    self._store(self._place(which, row, following), new[which])
+                parts = zip(self._parts, before, strict=True)
+                self._carried.append([self._datum(i, place).fma(new[which], sofar) for (_, which, place), sofar in parts])
+            sums: dict[int, Vec] = {}
+            for (f, _, _), value in zip(self._parts, self._carried.pop(), strict=True):
+                sums[f] = sums[f] + value if f in sums else value
+            for f, value in sums.items():
+                self._store(self._sum_of(j, f), value)
 
     @property
     def _order(self) -> Any:
@@ -315,8 +322,13 @@ class ModeLoops:
         """LLVM's pointer to a coefficient of a coordinate (0), of its rate (1) or of its acceleration (2)."""
         return self.b.gep(self._rows[which], [self.b.add(self.b.mul(row, self._stride), index)])
 
-    def _parameter(self, start: Any, i: Any) -> Vec:
-        return self._load(self.b.gep(self._parameters, [self.b.add(start, i)]))
+    def _datum(self, i: Any, place: int) -> Vec:
+        """A number of the record of a mode."""
+        return self._at(self.b.add(self.b.mul(i, LONG(self.block.record)), LONG(place)))
+
+    def _at(self, index: Any) -> Vec:
+        """A number behind the number of modes."""
+        return self._load(self.b.gep(self._data, [self.b.add(index, LONG(1))]))
 
     def _load(self, pointer: Any) -> Vec:
         return Vec(self.b, self.series.memory.load_from(pointer), self.series.memory.arithmetic)
@@ -324,38 +336,38 @@ class ModeLoops:
     def _store(self, pointer: Any, value: Vec) -> None:
         self.b.store(value.value, pointer).align = 8
 
-    def _total(self, count: int, parts: list[tuple[int, Any, Any]]) -> Vec:
-        """The sum over modes of coefficients, from a start on, times coordinates or rates, from a row on."""
-        with self._loop(0, count, carried=True) as (i, before):
-            total = before
-            for which, start, base in parts:
-                begin = LONG(start) if isinstance(start, int) else start
-                total = self._parameter(begin, i).fma(self._load(self._place(which, self.b.add(base, i), self._order)), total)
-            self._carried.append(total)
-        return self._carried.pop()
+    def _total(self, parts: list[tuple[int, Any, Any]]) -> Vec:
+        """The sum over modes of coefficients, which are functions of the mode, times coordinates or rates, from a row on."""
+        with self._loop(0, self._count, 1) as (i, (total,)):
+            for which, factor, base in parts:
+                total = factor(i).fma(self._load(self._place(which, self.b.add(base, i), self._order)), total)
+            self._carried.append([total])
+        return self._carried.pop()[0]
 
     @contextmanager
-    def _loop(self, begin: int, end: int, carried: bool = False) -> Iterator[Any]:
-        """A loop over whole numbers; with `carried` a number that begins with 0 goes through it, whose next value is put last
-        into `_carried` by the code within."""
+    def _loop(self, begin: int, end: Any, carried: int | None = None) -> Iterator[Any]:
+        """A loop over whole numbers; so many numbers as `carried` says, which begin with 0, go through it: their next
+        values are put last into `_carried` by the code within."""
         b, before = self.b, self.b.block
         body = b.append_basic_block("modes")
         b.branch(body)
         b.position_at_end(body)
         i = b.phi(LONG)
         i.add_incoming(LONG(begin), before)
-        if carried:
-            zero = self.series.memory.arithmetic.number(b, 0.0)
-            total = b.phi(zero.value.type)
-            total.add_incoming(zero.value, before)
-            yield i, Vec(b, total, self.series.memory.arithmetic)
-            total.add_incoming(self._carried[-1].value, b.block)
-        else:
+        if carried is None:
             yield i
+        else:
+            zero = self.series.memory.arithmetic.number(b, 0.0)
+            totals = [b.phi(zero.value.type) for _ in range(carried)]
+            for total in totals:
+                total.add_incoming(zero.value, before)
+            yield i, [Vec(b, total, self.series.memory.arithmetic) for total in totals]
+            for total, value in zip(totals, self._carried[-1], strict=True):
+                total.add_incoming(value.value, b.block)
         following = b.add(i, LONG(1))
         i.add_incoming(following, b.block)
         after = b.append_basic_block("after")
-        b.cbranch(b.icmp_signed("<", following, LONG(end)), body, after)
+        b.cbranch(b.icmp_signed("<", following, LONG(end) if isinstance(end, int) else end), body, after)
         b.position_at_end(after)
 
 

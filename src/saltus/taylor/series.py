@@ -17,13 +17,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from saltus.taylor.graph import LEAVES, RECORD_WIDTH, degree
-from saltus.taylor.memory import Memory, Node, Place, Tape
+from saltus.taylor.memory import Memory, ModeRows, Node, Place, Tape
 from saltus.taylor.rules import (
     ARITHMETIC,
     FUNCTIONS,
     SETTINGS,
     InnerLoop,
-    ModeRows,
     Row,
     by_slope,
     constant_table,

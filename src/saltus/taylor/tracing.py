@@ -35,8 +35,7 @@ from saltus.taylor.graph import (
     uses_velocity,
 )
 from saltus.taylor.load_tables import LoadTime
-from saltus.taylor.memory import ModeBlock, ModeInput, local_parts, mode_block, without_modes
-from saltus.taylor.rules import ModeRows
+from saltus.taylor.memory import ModeBlock, ModeInput, ModeRows, local_parts, mode_block, without_modes
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -338,7 +337,7 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
     result.contact_coordinates = tuple(model.coordinates.index(contact.coordinate) for contact in contacts)
     found = constrained_acceleration(model, t, q, v, load, [Expr("free", (), i) for i in range(local)], slides)
     if local < result.dof:
-        result.modes = mode_block(model.mode_equations(t, q, v, load), local, q.sums)
+        result.modes = mode_block(model.mode_equations(t, q, v, load), local, result.dof - local, q.sums)
         found += [Expr("mode", (), i) for i in range(local, result.dof)]
     return found
 

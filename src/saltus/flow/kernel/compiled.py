@@ -91,9 +91,12 @@ class CompiledStructure:
     signs: tuple[int, ...] = ()  # of the contacts, if there are several
     frictions: int = 0
 
-    def prepare(self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray]) -> tuple[tuple[Any, ...], Any]:
-        """The arguments `env` and `model` of the kernel for given numbers (see `one_contact/kernel.py`)."""
-        constants, geometry = np.zeros(self.constant_count), np.zeros(3)
+    def prepare(
+        self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray], data: Any = ()
+    ) -> tuple[tuple[Any, ...], Any]:
+        """The arguments `env` and `model` of the kernel for given numbers (see `one_contact/kernel.py`). Those of modes, `data`,
+        follow the constants."""
+        constants, geometry = np.append(np.zeros(self.constant_count), data), np.zeros(3)
         fill_constants, fill_geometry = _load_fillers()
         fill_constants(self.tables[0], parameters, constants)
         if self.several:
@@ -212,7 +215,12 @@ def structure_functions(trace: Trace) -> list[WrittenFunction]:
 
 
 def _function(name: str, places: Places, content: Sequence[Any]) -> WrittenFunction:
-    """A function of one motion; its signature has its name in `memory.py`."""
+    """A function of one motion; its signature has its name in `memory.py`. It has no places of what it does not read in
+    a state."""
+    if not isinstance(content, SeriesOf):
+        read = {node[0] for case in content for node in case.tape.nodes}
+        leaves = {op: place for op, place in places.leaves.items() if op in read or place[0] != "state"}
+        places = replace(places, leaves=leaves)
     return WrittenFunction(name, getattr(memory, name.upper()), places, SCALAR, content)
 
 
@@ -257,7 +265,7 @@ def _series(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
     rows, inputs, gap = trace.local_rows, trace.inputs_of_modes, [("g", 0)] if trace.gap is not None else []
     margins = [("m", j) for j in range(len(trace.reactions) + len(trace.margins))]
     targets = [*(("a", i) for i in rows), *gap, *margins, *[None] * len(inputs)]
-    leaves = LEAVES | _free(trace)
+    leaves = LEAVES | _free(trace) | _data(known)
     places = Places(("t", "origin", "side", "env", "piece", "q", "v", "a", "g", "m", "w", "order"), leaves)
     modes, first_order = trace.mode_rows((("q", 0), ("v", 0), ("a", 0)), 1 + trace.columns), trace.first_order_rows
     positions, velocities = ([(name, i) for i in rows] for name in ("q", "v"))
@@ -271,6 +279,11 @@ def _free(trace: Trace) -> dict[str, tuple[str, int]]:
     """The places behind the parameters that hold in which direction each friction slides, and whether each coordinate is free."""
     first = len(trace.parameters)
     return {"slide": ("parameters", first), "free": ("parameters", first + len(trace.friction_coordinates))}
+
+
+def _data(known: dict[Expr, int]) -> dict[str, tuple[str, int]]:
+    """The place behind the constants of the numbers of modes."""
+    return {"datum": ("constants", max(1, len(known)))}
 
 
 def _contact_series(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
@@ -313,33 +326,10 @@ def _tangent(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
         targets = [("state", starts[leaf.op] + leaf.value) for leaf in changes]
         roots, when = list(map(trace.written_out, changes.values())), (("kind", int(kind)), ("detail", int(detail)))
         cases.append(Case(tape(roots, known), targets, when))
-    places = Places(("kind", "detail", "t", "origin", "side", "env", "piece", "state"), LEAVES | _free(trace) | state)
-    return _function("tangent", places, cases)
-
-
-def edges_function(roots: Sequence[Expr]) -> WrittenFunction:
-    """The function `edges(parameters, out)`, which fills an array with the values of expressions of the parameters."""
-    return WrittenFunction(
-        "edges",
-        memory.CONSTANTS,
-        Places(("parameters", "out"), ENV),
-        SCALAR,
-        [Case(tape(roots, {}), [("out", i) for i in range(len(roots))])],
+    places = Places(
+        ("kind", "detail", "t", "origin", "side", "env", "piece", "state"), LEAVES | _free(trace) | _data(known) | state
     )
-
-
-def margins_function(traced: Trace, names: Sequence[str]) -> WrittenFunction:
-    """The function `margins` of a trace that stops at these: their values at a state, with velocities and accelerations behind
-    the coordinates."""
-    rates = [(op, k, i) for k, op in ((1, "velocity"), (2, "acceleration")) for i in range(traced.dof)]
-    behind = {Expr(op, (), i): Expr("coordinate", (), k * traced.dof + i) for op, k, i in rates}
-    return values_function("margins", [substitute(traced.margins[name], behind) for name in names])
-
-
-def values_function(name: str, roots: list[Expr]) -> WrittenFunction:
-    """A function of the state that fills its last argument with the values of expressions."""
-    places = Places(("t", "origin", "side", "env", "piece", "state", "out"), LEAVES | HERE)
-    return _function(name, places, [Case(tape(roots, {}), [("out", i) for i in range(len(roots))])])
+    return _function("tangent", places, cases)
 
 
 def _table(name: str, places: Places, roots: list[Expr], known: dict[Expr, int]) -> WrittenFunction:
@@ -357,9 +347,15 @@ class Program:
     model: Any  # the structure's functions and the geometry of its contact
     limits: tuple[str, ...]
 
+    @property
+    def data(self) -> np.ndarray:
+        """The numbers of the modes of a structure, behind the constants."""
+        data: np.ndarray = self.env[1][self.structure.constant_count :]
+        return data
+
     def with_numbers(self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray]) -> Program:
         """The same with other numbers."""
-        env, model = self.structure.prepare(parameters, records)
+        env, model = self.structure.prepare(parameters, records, self.data)
         return replace(self, env=env, model=model)
 
 
@@ -379,7 +375,9 @@ def _made(system: System, asked: tuple[Any, ...]) -> Program:
         _structures[asked] = traced, load_structure(traced)
     traced, structure = _structures[asked]
     parameters = np.array([value for _, value in numbers(system)])
-    return Program(traced, structure, *structure.prepare(parameters, record_table(system, traced.records)), tuple(traced.margins))
+    data = system.in_gap_coordinates.model.records.array if traced.modes is not None else ()
+    env, model = structure.prepare(parameters, record_table(system, traced.records), data)
+    return Program(traced, structure, env, model, tuple(traced.margins))
 
 
 _structures: dict[Any, tuple[Trace, CompiledStructure]] = {}

@@ -175,6 +175,7 @@ def memory_plan(trace: Trace) -> MemoryPlan:
         contacts=len(trace.signs),
         frictions=len(trace.friction_coordinates),
         constants=max(1, len(constants(trace))),
+        data=0 if trace.modes is None else trace.modes.data,
         records=len(trace.records),
         stops=len(trace.reactions) + len(trace.margins),
         guards=len(equations.guards) if equations else None,
@@ -199,7 +200,7 @@ def _leaves(plan: MemoryPlan, time: int, position: int, velocity: int) -> dict[s
     parts = {"coordinate": position, "velocity": velocity, "parameter": plan.places.parameters, "free": plan.places.free}
     parts |= {"constant": plan.places.constants, "record": plan.places.records}
     numbers = {"time": time, "record_time": SLOTS.now, "origin": SLOTS.origin, "side": SLOTS.side}
-    parts["slide"] = parts["parameter"] + plan.parameters
+    parts["slide"], parts["datum"] = parts["parameter"] + plan.parameters, parts["constant"] + plan.constants
     return {op: ("m", slot) for op, slot in (parts | numbers).items()}
 
 

@@ -103,6 +103,7 @@ class MemoryPlan:
     contacts: int  # of a model with several
     frictions: int
     constants: int
+    data: int  # of the modes of a structure, behind the constants
     records: int
     stops: int
     guards: int | None = None  # where one coordinate is free; None without such equations
@@ -114,7 +115,7 @@ class MemoryPlan:
         several, contacts = self.local if self.contacts or self.frictions else 0, self.contacts
         sizes = [self.rows] * 8 + [self.parameters + self.frictions, several, contacts, several**2, contacts**2]
         sizes += [several, several, several**2, contacts, contacts]
-        sizes += [self.constant_guards, self.constants, self.records * RECORD_WIDTH]
+        sizes += [self.constant_guards, self.constants + self.data, self.records * RECORD_WIDTH]
         sizes += [rows * SERIES_LENGTH for rows in (self.rows, self.rows, self.own, self.stops)]
         return Parts(*(len(SLOTS) + sum(sizes[:part]) for part in range(len(sizes))))
 

@@ -244,7 +244,7 @@ class Lanes:
             kernel=(load_advance(self.several), self.program.model if self.several else self.program.structure.functions),
             flags=np.zeros(1, dtype=FLAGS),
             rows=np.zeros(WIDTH, dtype=ROW),
-            constants_of=np.zeros((WIDTH, plan.constants)),
+            constants_of=np.tile(np.append(np.zeros(plan.constants), self.program.data), (WIDTH, 1)),
             geometry=np.zeros((WIDTH, numbers)),
             stroboscopic=np.zeros((WIDTH, 2 * LONGEST_RECURRENCE, 2 * own)),
             agreements=np.zeros((WIDTH, LONGEST_RECURRENCE + 1), dtype=np.int64),

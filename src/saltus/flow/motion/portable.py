@@ -6,6 +6,7 @@ by tables that are made from the types with which they are compiled, so that nob
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import count
@@ -16,23 +17,36 @@ import numpy as np
 from saltus.checks import LIMITS
 from saltus.errors import SaltusError
 from saltus.flow.contacts.layout import ContactColumn, FrictionColumn
+from saltus.flow.kernel import memory
 from saltus.flow.kernel.compiled import (
+    HERE,
+    LEAVES,
     MOST_COEFFICIENTS,
     contacts_text,
-    edges_function,
-    margins_function,
     one_contact_text,
     program,
     structure_functions,
-    values_function,
 )
 from saltus.flow.kernel.layout import EventCode, Geometry, Mode, Status
 from saltus.flow.kernel.memory import ADVANCE, ADVANCE_CONTACTS, MOTION, SIZES
 from saltus.flow.motion.events import EventKind, Stop
 from saltus.flow.motion.simulate import refusal
 from saltus.systems import Pulse, System, children, substitute
-from saltus.taylor import RECORD_WIDTH, Expr, Trace, WrittenFunction, combine, record_table, trace
+from saltus.taylor import (
+    RECORD_WIDTH,
+    Case,
+    Expr,
+    Places,
+    Trace,
+    WrittenFunction,
+    combine,
+    record_table,
+    tape,
+    trace,
+)
+from saltus.taylor import substitute as substitute_leaves
 from saltus.taylor.load_tables import AFTER, SINCE, WITHIN
+from saltus.taylor.vectors import SCALAR
 
 ENUMERATIONS = (Mode, Status, EventCode, Geometry, ContactColumn, FrictionColumn)
 ENV = ("parameters", "constants", "breaks", "table")
@@ -143,7 +157,8 @@ class PortableMotion:
             "arguments": self.kernel.arguments,
             "several": trace.several,
             "sizes": dict(zip(SIZES, map(int, structure.sizes), strict=True)),
-            "constant_count": structure.constant_count,
+            "constant_count": structure.constant_count + len(self.run.data),
+            "data": self.run.data.tolist(),
             "modes": [0.0] * structure.frictions + [1.0] * (structure.sizes.local if trace.several else 0),
             "signs": list(trace.signs),
             "contact_coordinates": list(trace.contact_coordinates),
@@ -193,3 +208,29 @@ class PortableMotion:
             "frictions": [{"name": f.name, "coordinate": f.coordinate} for f in model.frictions],
             "sides": [{"side": side} for side in model.sides],
         }
+
+
+def edges_function(roots: Sequence[Expr]) -> WrittenFunction:
+    """The function `edges(parameters, out)`, which fills an array with the values of expressions of the parameters."""
+    return WrittenFunction(
+        "edges",
+        memory.CONSTANTS,
+        Places(("parameters", "out"), {"parameter": ("parameters", 0)}),
+        SCALAR,
+        [Case(tape(roots, {}), [("out", i) for i in range(len(roots))])],
+    )
+
+
+def margins_function(traced: Trace, names: Sequence[str]) -> WrittenFunction:
+    """The function `margins` of a trace that stops at these: their values at a state, with velocities and accelerations behind
+    the coordinates."""
+    rates = [(op, k, i) for k, op in ((1, "velocity"), (2, "acceleration")) for i in range(traced.dof)]
+    behind = {Expr(op, (), i): Expr("coordinate", (), k * traced.dof + i) for op, k, i in rates}
+    return values_function("margins", [substitute_leaves(traced.margins[name], behind) for name in names])
+
+
+def values_function(name: str, roots: list[Expr]) -> WrittenFunction:
+    """A function of the state that fills its last argument with the values of expressions."""
+    places = Places(("t", "origin", "side", "env", "piece", "state", "out"), LEAVES | HERE)
+    cases = [Case(tape(roots, {}), [("out", i) for i in range(len(roots))])]
+    return WrittenFunction(name, getattr(memory, name.upper()), places, SCALAR, cases)

@@ -209,7 +209,7 @@ class ContactsEquations(OrbitEquations):
         """The arrays that `follow_contact_segments` fills; None where a segment cannot be followed."""
         parameters = self._values.copy()
         parameters[self._places] = values
-        numbers = self._run.structure.prepare(parameters, self._records)
+        numbers = self._run.structure.prepare(parameters, self._records, self._run.data)
         return self._follower.follow_contacts(numbers, (plan, times, state), with_extremes)
 
     def _assembled(

@@ -17,7 +17,7 @@ import { BUFFER, Refusal, Run } from "./run.js";
  * @property {Enumeration} ContactColumn @property {Enumeration} FrictionColumn
  * @property {Record<string, [number, boolean]>} record  The place of each number of the motion, and whether it is whole.
  * @property {number} record_size @property {number} most_size @property {number} most_order @property {Argument[]} arguments @property {boolean} several
- * @property {Record<string, number>} sizes @property {number} constant_count @property {number[]} modes @property {number[]} signs
+ * @property {Record<string, number>} sizes @property {number} constant_count @property {number[]} data @property {number[]} modes @property {number[]} signs
  * @property {number[]} contact_coordinates @property {number[]} friction_coordinates
  * @property {number} positions_at @property {number} grounds_at @property {number} contact_numbers
  * @property {string[]} limits @property {import("./load_table.js").Records} records
@@ -187,6 +187,7 @@ export class Engine {
     this.put("breaks", system.breaks);
     this.put("table", system.table);
     exports.constants(this.address("parameters"), this.address("constants"));
+    this.doubles(this.address("constants"), layout.constant_count).set(layout.data, layout.constant_count - layout.data.length);
     const constants = this.doubles(this.address("constants"), layout.constant_count).slice();
     if (this.several) {
       exports.matrices(...this.environment(system), 0n, this.scratch, this.results);
