@@ -2,8 +2,8 @@
 A fit by optax, in JAX
 ======================
 
-Gradients of motions with impacts in JAX: an optimiser of optax finds damping, restitution and start of a metainterface. It needs
-`pip install "saltus[jax]" optax`."""
+Gradients of motions with impacts in JAX: an optimiser of optax finds damping, restitution and start of a metainterface; and the
+gradient of a mean over 200 motions, which lanes follow together. It needs `pip install "saltus[jax]" optax`."""
 
 import jax
 import jax.numpy as jnp
@@ -55,3 +55,17 @@ ax.semilogy(history[1:], "o-")
 ax.set(xlabel="step of L-BFGS", ylabel="mean square of the misfit")
 assert np.allclose([unknown["values"][path] for path in ("model.damping", "impact.e")], [0.1, 0.9], atol=1e-9)
 assert np.allclose(unknown["start"], [0.3, 0.1], atol=1e-9)
+
+starts = jnp.stack([jnp.linspace(0.05, 0.8, 200), jnp.zeros(200)], axis=1)
+ends = jax.vmap(saltus.to_jax(system, periods=2), in_axes=(None, 0))  # simulate_many, with its derivatives
+
+
+def size(e):
+    """The mean square of theta after two forcing periods."""
+    return jnp.mean(ends({"impact.e": e}, starts)[:, 0] ** 2)
+
+
+losses = {"impact.e": np.array([[0.9 - 1e-5], [0.9 + 1e-5]])}
+beside = saltus.simulate_many(system, parameters=losses, theta=np.array(starts[:, 0]), periods=2).theta
+print(f"d mean(theta^2) / de = {jax.grad(size)(0.9):.6f}")
+assert np.isclose(jax.grad(size)(0.9), float((beside[1] ** 2 - beside[0] ** 2).mean()) / 2e-5, rtol=1e-6)

@@ -8,6 +8,7 @@ import pytest
 
 import saltus
 from saltus.errors import ParameterError
+from saltus.flow.motion import in_jax
 
 SYSTEM = saltus.System(
     model=saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1),
@@ -74,12 +75,32 @@ def test_a_product_with_the_transpose_is_the_same_from_both_sides(jax):
     assert across @ pushed == pytest.approx(float(expected), rel=1e-12)
 
 
-def test_many_starts_are_followed_one_after_the_other(jax):
-    end, starts = saltus.to_jax(SYSTEM, periods=1), np.array([[0.3, 0.0], [0.1, 0.2], [-0.2, 0.0]])
-    many = jax.vmap(jax.jacrev(end, argnums=1), in_axes=(None, 0))(VALUES, starts)
-    for start, found in zip(starts, many, strict=True):
-        known = saltus.sensitivities(SYSTEM, theta=start[0], velocity=start[1], periods=1)
-        assert np.allclose(found, known.state, rtol=1e-12, atol=1e-12)
+@pytest.mark.parametrize("asked", [{"periods": 2}, {"times": [2.0, 9.0]}])
+def test_many_motions_are_those_that_are_followed_alone(jax, asked, monkeypatch):
+    together = []
+    monkeypatch.setattr(in_jax, "simulate_many", lambda *a, **b: together.append(b) or saltus.simulate_many(*a, **b))
+    function, starts = saltus.to_jax(SYSTEM, **asked), np.array([[0.3, 0.0], [0.1, 0.2], [-0.2, 0.0]])
+    losses = np.array([0.95, 0.9, 0.85])
+
+    def of(e, start):
+        return function({"load.frequency": 1.0, "impact.e": e}, start)
+
+    for mode in (lambda f, **_: f, jax.jacfwd, jax.jacrev):
+        one = jax.jit(mode(of, argnums=(0, 1)))
+        found, known = jax.jit(jax.vmap(one))(losses, starts), [one(*each) for each in zip(losses, starts, strict=True)]
+        for one_leaf, leaves in zip(jax.tree.leaves(found), zip(*map(jax.tree.leaves, known), strict=True), strict=True):
+            assert np.allclose(one_leaf, np.array(leaves), rtol=1e-10, atol=1e-10)
+    assert bool(together) == ("periods" in asked)
+    one_system = jax.vmap(of, in_axes=(None, 0))(0.9, starts)
+    assert one_system.shape == (3, 2) if "periods" in asked else (3, 2, 2)
+
+
+def test_one_of_many_motions_that_cannot_go_on_is_refused_as_alone(jax):
+    pushed = saltus.System(model=saltus.Metainterface(beta0=1.4), load=saltus.Load(vertical=1.0))  # from rest to both sides
+    many = jax.vmap(lambda start: saltus.to_jax(pushed, duration=1.0)({}, start))
+    assert np.isfinite(many(np.array([[0.3, 0.0], [0.1, 0.0]]))).all()
+    with pytest.raises(jax.errors.JaxRuntimeError, match="from rest at contact at time 0 is not unique"):
+        jax.block_until_ready(many(np.array([[0.3, 0.0], [0.0, 0.0]])))
 
 
 def test_a_start_without_derivative_does_not_spoil_the_parameters(jax):

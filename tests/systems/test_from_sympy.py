@@ -22,7 +22,7 @@ def wall(e=0.5):
         parameters={k: 4.0, d: 0.5},
         channels={"force": F},
         contacts=[saltus.Contact(name="stop", coordinate="x", sign=-1, position=d)],
-        name="Stopped",
+        name="StoppedMass",
     )
     return saltus.System(model=model, load=saltus.Load(force=0.25), impact=saltus.NewtonImpact(e=e))
 
@@ -83,13 +83,29 @@ def test_kanes_equations_with_rates_as_speeds_are_taken():
     assert saltus.simulate(system, x=0.2, velocity=0.0, duration=1.0).position == pytest.approx(0.2 * np.cos(3.0), abs=1e-12)
 
 
+def test_other_equations_are_another_model():
+    """A file of the first of two systems is read as that system, whether they are named or not."""
+    x, v, k = sympy.symbols("x v k")
+    asked = {"coordinates": [x], "velocities": [v], "parameters": {k: 2.0}}
+    linear, cubic = (saltus.System(model=saltus.from_sympy(**asked, force=[-k * x**n])) for n in (1, 3))
+    again = saltus.from_sympy(**asked | {"parameters": {k: 3.0}}, force=[-k * x])
+    assert type(again) is type(linear.model) is not type(cubic.model)
+    for system, force in ((linear, -1.0), (cubic, -0.25)):
+        read = saltus.System.from_json(system.to_json())
+        assert read == system
+        assert read.model.force(0.0, 0.5, 0.0, read.load) == force
+    saltus.from_sympy(**asked, force=[-k * x], name="OneName")
+    with pytest.raises(ParameterError, match="there is a model 'OneName' with other equations already"):
+        saltus.from_sympy(**asked, force=[-k * x**3], name="OneName")
+
+
 def test_what_an_expression_may_not_have_is_refused():
     x, v, k, z = sympy.symbols("x v k z")
     with pytest.raises(ParameterError, match="force has 'z', which is none of x, k"):
         saltus.from_sympy(coordinates=[x], velocities=[v], force=[-k * x + z], parameters={k: 1.0})
     with pytest.raises(ParameterError, match="velocities must have the rate of each coordinate, and x has none"):
         saltus.from_sympy(coordinates=[x], force=[-k * x], parameters={k: 1.0})
-    with pytest.raises(ParameterError, match="there is a model 'TwoStops' already"):
+    with pytest.raises(ParameterError, match="there is a model 'TwoStops' with other equations already"):
         saltus.from_sympy(coordinates=[x], velocities=[v], force=[-k * x], parameters={k: 1.0}, name="TwoStops")
     with pytest.raises(ParameterError, match="mass has"):
         saltus.from_sympy(coordinates=[x], velocities=[v], mass=[[1 + v]], force=[-k * x], parameters={k: 1.0})

@@ -6,6 +6,7 @@ in another process; SymPy is not needed there.
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, make_dataclass, replace
@@ -43,13 +44,13 @@ def from_sympy(
     parameters: Mapping[Any, float],
     channels: Mapping[str, Any] | None = None,
     contacts: Sequence[Contact] = (),
-    name: str = "FromSympy",
+    name: str | None = None,
 ) -> ContactModel:
     """A model M(q) q'' = f(t, q, q') from expressions of SymPy, or from `LagrangesMethod` or `KanesMethod` of its mechanics.
 
     The coordinates have the names of their symbols, and each parameter is a number of the model with its symbol's name. A
-    system with the model is written to files as others are; in another process call this function, with the same `name`, before
-    such a file is read.
+    system with the model is written to files as others are; in another process call this function with the same equations and
+    `name` before such a file is read.
 
     Parameters
     ----------
@@ -71,7 +72,7 @@ def from_sympy(
     contacts
         Contacts, with coordinates by name; a position may be an expression of the parameters.
     name
-        The name of the model's class.
+        The name of the model's class, which no model with other equations has; by default FromSympy with a digest of them.
 
     Raises
     ------
@@ -113,7 +114,7 @@ def from_sympy(
             "force",
         )
     made = _Equations(
-        name,
+        "FromSympy" if name is None else name,
         tuple(_name_of(each) for each in coordinates),
         tuple(_name_of(each) for each in parameters),
         tuple(channels or ()),
@@ -122,6 +123,8 @@ def from_sympy(
         tuple(replace(contact, position=0.0) for contact in contacts),
         tuple(text("contacts", contact.position, "p") for contact in contacts),
     )
+    if name is None:
+        made = replace(made, name=f"FromSympy_{hashlib.sha256(repr(made).encode()).hexdigest()[:8]}")
     model: ContactModel = _class_of(made)(**{_name_of(key): value for key, value in parameters.items()})
     return model
 
@@ -192,10 +195,11 @@ _CLASSES: dict[str, Any] = {}  # by their equations, so that equal equations are
 def _class_of(made: _Equations) -> Any:
     """The class of a model with these equations, which is then known by its name."""
     if repr(made) in _CLASSES:
-        MODELS[made.name] = _CLASSES[repr(made)]
         return _CLASSES[repr(made)]
-    if made.name in MODELS and MODELS[made.name].__module__ != __name__:
-        raise ParameterError(f"there is a model {shown(made.name)} already; give this one another name", "name")
+    if made.name in MODELS:
+        raise ParameterError(
+            f"there is a model {shown(made.name)} with other equations already; give this one another name", "name"
+        )
     if not re.fullmatch(r"[A-Za-z]\w*", made.name):
         raise ParameterError(f"name must be one as Python's, got {shown(made.name)}", "name")
     one, size = len(made.coordinates) == 1, len(made.coordinates)

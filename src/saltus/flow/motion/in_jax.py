@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,7 +12,9 @@ import numpy as np
 
 from saltus.checks import Numbers, check_names, check_number, instants
 from saltus.errors import ParameterError, shown
-from saltus.flow.motion.motion import Motion
+from saltus.flow.lanes.ensemble import simulate_many
+from saltus.flow.motion.events import Stop
+from saltus.flow.motion.motion import Motion, state_names
 from saltus.flow.motion.sensitivities import sensitivities
 from saltus.flow.motion.simulate import MotionRequest, simulate
 from saltus.systems import System, check_path, check_system
@@ -36,8 +39,9 @@ def to_jax(
 
     and gives the state at the end, (2 n,), or those at m `times`, (m, 2 n). Its derivatives are those of `sensitivities`,
     through all impacts: dx = (dx/dx_0) dx_0 + (dx/dc) dc, and the transpose of this. It may stand in `jax.jit`, `grad`, `jvp`,
-    `jacfwd` and `jacrev`; in `vmap` the motions are followed one after the other. Second derivatives are refused. Where a motion
-    has no derivative, it is nan.
+    `jacfwd` and `jacrev`. In `vmap` the motions are followed together by `simulate_many`, but one after the other for states at
+    `times`, and for derivatives of systems whose contacts keep sums of coordinates. Second derivatives are refused. Where a
+    motion has no derivative, it is nan.
 
     JAX must compute with 64 bits, `jax.config.update("jax_enable_x64", True)`. A motion that is refused, or that ends before one
     of the `times`, raises JAX's `JaxRuntimeError` with the sentence of ours in its text.
@@ -79,9 +83,9 @@ def to_jax(
             raise ParameterError(f"times must be finite and not before the start, {time:g}", "times")
         duration = float(np.max(asked, initial=time)) - time
     request: dict[str, Any] = {"periods": periods, "duration": duration, "tol": tol, "time": time, "side": side}
-    request |= {"stop_at": check_names("stop_at", stop_at, "margins"), "dense": times is not None}
+    request |= {"stop_at": check_names("stop_at", stop_at, "margins")}
     somewhere = dict.fromkeys(system.model.coordinates, 0.0)
-    MotionRequest(system=system, coordinates=somewhere, velocity=0.0, **request)
+    MotionRequest(system=system, coordinates=somewhere, velocity=0.0, dense=times is not None, **request)
     return _StatesFunction(system, times, request).states
 
 
@@ -120,7 +124,7 @@ class _StatesFunction:
             def call(paths: tuple[str, ...], numbers: Any, start: Any) -> Any:
                 given = jax.tree.map(lambda shape: jax.ShapeDtypeStruct(shape, float), shapes(numbers, start), is_leaf=_is_shape)
                 return jax.pure_callback(
-                    lambda *x: function(paths, *map(np.asarray, x)), given, numbers, start, vmap_method="sequential"
+                    lambda *x: function(paths, *map(np.asarray, x)), given, numbers, start, vmap_method="broadcast_all"
                 )
 
             return call
@@ -142,20 +146,56 @@ class _StatesFunction:
         with_columns.defjvp(refuse)
         return plain
 
-    def _states(self, paths: tuple[str, ...], numbers: np.ndarray, start: np.ndarray) -> np.ndarray:
-        return self._read(simulate(**self._arguments(paths, numbers, start)))
+    def _states(self, *given: Any) -> np.ndarray:
+        """The states, for paths, numbers and start; of many motions, if these have axes before their own."""
+        return self._found(False, *given)[0]
 
-    def _with_columns(self, paths: tuple[str, ...], numbers: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _with_columns(self, *given: Any) -> tuple[np.ndarray, ...]:
         """The states with their derivatives to the start and to the numbers."""
-        found = sensitivities(parameters=paths, **self._arguments(paths, numbers, start))
-        columns = np.hstack([found.state, found.parameters]) if self.times is None else found.at(self.times)
-        return self._read(found.motion), columns
+        return self._found(True, *given)
 
-    def _arguments(self, paths: tuple[str, ...], numbers: np.ndarray, start: np.ndarray) -> dict[str, Any]:
-        position, velocity = np.split(start, 2)
-        coordinates = dict(zip(self.system.model.coordinates, position.tolist(), strict=True))
-        system = self.system.with_(dict(zip(paths, numbers.tolist(), strict=True)))
-        return {"system": system, "velocity": tuple(velocity.tolist()), **self.request, **coordinates}
+    def _found(self, columns: bool, paths: tuple[str, ...], numbers: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, ...]:
+        if not (many := start.shape[:-1]):
+            return self._of_one(columns, paths, numbers, start)
+        numbers, start = (x.reshape(math.prod(many), x.shape[-1]) for x in (numbers, start))
+        sums = self.system.in_gap_coordinates is not self.system  # lanes have no derivatives of such motions to parameters
+        if self.times is None and not (columns and sums):
+            found = self._in_lanes(columns, paths, numbers, start)
+        else:
+            each = [self._of_one(columns, paths, *row) for row in zip(numbers, start, strict=True)]
+            found = tuple(map(np.array, zip(*each, strict=True)))
+        return tuple(part.reshape(*many, *part.shape[1:]) for part in found)
+
+    def _of_one(self, columns: bool, paths: tuple[str, ...], numbers: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, ...]:
+        asked = self._arguments(start) | {"dense": self.times is not None}
+        asked["system"] = self.system.with_(dict(zip(paths, numbers.tolist(), strict=True)))
+        if not columns:
+            return (self._read(simulate(**asked)),)
+        found = sensitivities(parameters=paths, **asked)
+        by = np.hstack([found.state, found.parameters]) if self.times is None else found.at(self.times)
+        return self._read(found.motion), by
+
+    def _in_lanes(self, columns: bool, paths: tuple[str, ...], numbers: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, ...]:
+        """The ends of many motions; one that cannot go on is followed alone, which says why."""
+        more: dict[str, Any] = {
+            "parameters": dict(zip(paths, numbers.T, strict=True)),
+            "sensitivities": paths if columns else None,
+        }
+        found = simulate_many(self.system, sample=(), **self._arguments(start.T), **more)
+        stops = [str(found.stop.attrs["flag_meanings"]).split()[i] for i in found.stop.values]
+        for i, stop in enumerate(stops):
+            if stop not in (Stop.HORIZON, Stop.REST, Stop.LIMIT, Stop.SINGULAR):
+                self._of_one(False, paths, numbers[i], start[i])
+        states = np.column_stack([found[name].values for name in state_names(self.system.model.coordinates)])
+        return (states, found.derivative.values) if columns else (states,)
+
+    def _arguments(self, start: np.ndarray) -> dict[str, Any]:
+        """What is asked of a motion from a start, (2 n,), or of many, (2 n, m)."""
+        model, halves = self.system.model, np.split(start, 2)
+        position, velocity = (half.tolist() if half.ndim == 1 else [*half] for half in halves)
+        moving = velocity[: len(model.moving)]
+        given = {"velocity": moving[0] if len(moving) == 1 else tuple(moving)}
+        return self.request | dict(zip(model.coordinates, position, strict=True)) | given
 
     def _read(self, motion: Motion) -> np.ndarray:
         """The state at the end, or those at the times."""
