@@ -258,6 +258,63 @@ def test_painleves_paradox_is_refused_by_name_with_its_number():
         saltus.System(model=Rod(mu=3.0))
 
 
+@dataclass(frozen=True, kw_only=True)
+class UniformRod(saltus.ContactModel):
+    """A rod of half length and mass 1, and of inertia 1/3, at an angle to the floor, by the coordinates of its lower end."""
+
+    mu: float = 1.5
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "angle")
+    contacts = (saltus.Contact(name="floor", coordinate="y"),)
+
+    @property
+    def frictions(self):
+        return (saltus.Friction(name="rub", coordinate="x", kinetic=self.mu, contact="floor"),)
+
+    def mass_matrix(self, q):
+        c, s = np.cos(q[2]), np.sin(q[2])
+        return [[1.0, 0.0, -s], [0.0, 1.0, c], [-s, c, 4.0 / 3.0]]
+
+    def force(self, t, q, v, load):
+        c, s = np.cos(q[2]), np.sin(q[2])
+        return c * v[2] ** 2, s * v[2] ** 2 - 1.0, -c
+
+
+def painleve(mu: float, angle: float, s: float) -> float:
+    """1 - s mu A_nt / A_nn with A_nn = 1 + 3 cos^2 and A_nt = -3 sin cos (Painleve 1895; Genot and Brogliato 1999)."""
+    return 1.0 + s * mu * 3.0 * sin(angle) * cos(angle) / (1.0 + 3.0 * cos(angle) ** 2)
+
+
+@pytest.mark.parametrize("mu", [1.32, 1.35, 1.5])  # the paradox begins at 4/3, where the tangent of the angle is 2
+def test_a_rod_that_slides_is_refused_where_painleves_paradox_begins(mu):
+    system, refused = saltus.System(model=UniformRod(mu=mu), impact=saltus.NewtonImpact(e=0.5)), []
+    for angle in np.arctan([0.3, 0.8, 1.2, 1.6, 1.9, 2.0, 2.1, 3.0, 3.5, -1.0, -2.0]):
+        for way in (1.0, -1.0):
+            number, least = painleve(mu, angle, way), min(painleve(mu, angle, 1.0), painleve(mu, angle, -1.0))
+            for height, speed in ((0.0, 0.0), (1e-9, -1.0)):  # it slides, or hits the floor while it does
+                start = {"x": 0.0, "y": height, "angle": float(angle), "velocity": (way, speed, 0.0)}
+                try:
+                    assert saltus.simulate(system, **start, duration=1e-6).time == pytest.approx(1e-6, abs=1e-18)
+                    taken = True
+                except saltus.MotionError as error:
+                    taken, told = False, str(error)
+                    assert told.startswith("Painleve's paradox at floor at time")
+                    assert abs(float(told.partition("and is ")[2].split(",")[0]) - least) < 1e-6
+                    refused.append(angle)
+                assert taken == ((number if height == 0.0 else least) > 0.0)
+    assert bool(refused) == (mu > 4.0 / 3.0)
+
+
+@pytest.mark.parametrize(("tangent", "way"), [(1.0, -1.0), (3.6, -1.0), (30.0, 1.0)])
+def test_the_motion_of_a_rod_ends_by_name_at_the_angle_where_the_paradox_begins(tangent, way):
+    """tan^2 - 3 mu tan + 4 = 0, in whichever direction its end would slide if it did not stick."""
+    system = saltus.System(model=UniformRod(), impact=saltus.NewtonImpact(e=0.5))
+    motion = saltus.simulate(system, x=0.0, y=0.0, angle=float(np.arctan(tangent)), velocity=(way, 0.0, 0.0), duration=5.0)
+    assert (str(motion.stop), motion.limit) == ("limit", "Painleve's paradox at floor")
+    edges = np.arctan((4.5 + np.array([1.0, -1.0]) * sqrt(4.5**2 - 16.0)) / 2.0)
+    assert np.abs(np.concatenate([edges, np.pi - edges, -edges]) - motion.angle).min() < 1e-11
+
+
 # --- friction along the coordinate of a contact, and along a sum -----------------------------------------------------------
 
 

@@ -343,21 +343,25 @@ def _first_order_parts(course: SampledPart, own: np.ndarray, mass: np.ndarray) -
 def _friction_parts(course: SampledPart, mass: np.ndarray, force: np.ndarray) -> Parts:
     """What the grounds of frictions supply, where they move, and what the frictions take."""
     system, parts = course.system, Parts()
-    if not isinstance(system.model, ContactModel) or not (frictions := system.contact_model.frictions):
+    if not isinstance(system.model, ContactModel) or not system.contact_model.frictions:
         return parts
-    model, load = system.contact_model, system.load
-    normals = model.normal_forces(course.time, *_state(course.position, course.velocity), load)
+    inner, load, velocity = system.in_gap_coordinates, system.load, course.velocity
+    state, touching = _state(course.position, velocity), inner.contact_model
+    normals = system.contact_model.normal_forces(course.time, *state, load)
     holding = np.einsum("ijn,jn->in", mass, course.rate(course.velocity)) - force  # what makes a coordinate stick
-    slides = modes_of(model, course.side)[1]
-    for friction, normal, slide in zip(frictions, normals, slides, strict=True):
-        i, ground = model.coordinates.index(friction.coordinate), friction.ground_speed
-        for contact in (each for each in system.contact_model.contacts if each.name == friction.contact):
-            normal = np.where(slide == 2, 0.0, contact.sign * holding[model.coordinates.index(contact.coordinate)])
+    if inner is not system:  # each friction and each contact acts along one of its coordinates
+        made: Any = touching
+        holding, velocity = np.array(made.from_gaps()).T @ holding, np.array(made.sums()[0]) @ velocity
+    slides = modes_of(touching, course.side)[1]
+    for friction, normal, slide in zip(touching.frictions, normals, slides, strict=True):
+        i, ground = touching.coordinates.index(friction.coordinate), friction.ground_speed
+        for contact in (each for each in touching.contacts if each.name == friction.contact):
+            normal = np.where(slide == 2, 0.0, contact.sign * holding[touching.coordinates.index(contact.coordinate)])
         way = np.where(slide == 2, 0, slide)
-        acting = np.where(slide == 0, holding[i], -friction.slipping(course.velocity[i], way) * normal)
+        acting = np.where(slide == 0, holding[i], -friction.slipping(velocity[i], way) * normal)
         if ground:
             parts[SUPPLIED, f"ground.{friction.name}"] = course.integral(acting * ground)
-        parts[DISSIPATED, f"friction.{friction.name}"] = course.integral(acting * (ground - course.velocity[i]))
+        parts[DISSIPATED, f"friction.{friction.name}"] = course.integral(acting * (ground - velocity[i]))
     return parts
 
 

@@ -163,7 +163,9 @@ class InGapCoordinates(ContactModel):
         return super().normal_forces(t, self.own(t, theta, load), self.own(t, velocity, load, 1), load)
 
     def after_impact(self, contact: str, theta: Any, velocity: Any) -> Any:
-        """That of the model as it was given; none is asked for one where a wall moves."""
+        """That of the model as it was given; none has one where a wall moves, as it would not be told its velocity."""
+        if not self.jumps:
+            return tuple(theta[len(self.moving) :])
         return super().after_impact(contact, self.own(0.0, theta, None), self.own(0.0, velocity, None, 1))
 
     def kinetic_energy(self, t: Any, theta: Any, velocity: Any, side: Any, load: Any) -> Any:

@@ -219,7 +219,7 @@ def slides_on(motion, near):
     """Whether the frictions in the contacts in `near` will not change what they do while these contacts lose their speeds.
 
     If so they are let act along with them (`fill_rubbing`). A contact with the speed u and the restitution e has impulses of
-    (1 + e) / (1 - e) u times its mass until it rests.
+    (1 + e) / (1 - e) u times its mass until it rests; where these are within the tolerance it does not matter what they do.
     """
     speed, on = 0.0, True
     for i in range(motion.contacts.shape[0]):
@@ -235,6 +235,7 @@ def slides_on(motion, near):
                 on = on and abs(motion.inverse[c, across]) <= mu * motion.inverse[c, c]
             else:
                 on = on and rate * motion.coupling[i, i] > mu * motion.inverse[c, c] * speed
+    on = on or speed <= motion.tolerance
     if on and is_pressed(motion):
         fill_rubbing(motion)
     return on

@@ -77,6 +77,12 @@ from saltus.taylor import jit, lean_jit
 
 
 @lean_jit
+def rest_after(motion, near, beside, limit):
+    """`frozen_accumulation` where frictions in contacts go on as they do, else -1."""
+    return frozen_accumulation(motion, near, beside, limit) if slides_on(motion, near) else -1.0
+
+
+@lean_jit
 def end_accumulation_of(motion, t):
     """Bring contacts to rest whose impacts accumulate soon; returns the end of the accumulation, or t if there is none."""
     count, tol = motion.contacts.shape[0], motion.tolerance
@@ -92,20 +98,21 @@ def end_accumulation_of(motion, t):
         return t
     change = free_pulls(motion, t)
     near = near_contacts(motion, slow_impacts(tol))
-    if near == 0 or not slides_on(motion, near):
+    turns = turns_with(motion, last)
+    if near == 0 or (turns and not slides_on(motion, near)):
         return t
     limit = min(np.sqrt(10.0 * tol / change), motion_end(motion) - t)
-    together, turns, moving = near, turns_with(motion, last), 0
-    left = rubbed_accumulation(motion, t, near, last, limit) if turns else frozen_accumulation(motion, near, -1, limit)
+    together, moving = near, 0
+    left = rubbed_accumulation(motion, t, near, last, limit) if turns else rest_after(motion, near, -1, limit)
     if left < 0.0 and not turns:
         near = smaller_set(motion, near)
-        again = frozen_accumulation(motion, near, -1, limit) if near != 0 else -1.0
+        again = rest_after(motion, near, -1, limit) if near != 0 else -1.0
         left = again if again >= 0.0 else left + again
     if left < 0.0 and not turns and count > MOST_TRIED:  # other blocks, which do not act on this one, may be bouncing too
         block = block_of(motion, 1 << last, False)
         if together & ~block:
             near = together & block
-            again = frozen_accumulation(motion, near, block, limit)
+            again = rest_after(motion, near, block, limit)
             left = again if again >= 0.0 else left + again
     slow = slow_impacts(tol)
     while left < 0.0 and slow >= slowest and not turns:  # on ever smaller scales, as of bodies beside others that still move
@@ -113,7 +120,7 @@ def end_accumulation_of(motion, t):
         slower = near_contacts(motion, slow)
         if slower != near and slower != 0:
             near = slower
-            again = frozen_accumulation(motion, near, -1, limit)
+            again = rest_after(motion, near, -1, limit)
             left = again if again >= 0.0 else left + again
     for i in range(count):
         moving |= (1 << i) if near >> i & 1 and motion.rates[i] != 0.0 else 0
