@@ -1,7 +1,6 @@
 from .contacts.layout import SegmentEnd as SegmentEnd
 from .contacts.layout import SegmentExtremes as SegmentExtremes
 from .contacts.layout import SegmentPlan as SegmentPlan
-from .kernel.compiled import Program as Program
 from .kernel.compiled import program as program
 from .kernel.layout import EventCode as EventCode
 from .kernel.layout import SegmentColumn as SegmentColumn
@@ -46,6 +45,7 @@ from .motion.sensitivities import derivatives_of as derivatives_of
 from .motion.sensitivities import sensitivities as sensitivities
 from .motion.sensitivities import state_rates as state_rates
 from .motion.simulate import MotionRequest as MotionRequest
+from .motion.simulate import follow as follow
 from .motion.simulate import simulate as simulate
 from .motion.validity import Validity as Validity
 from .one_contact.regularity import ContactRegularity as ContactRegularity

@@ -21,13 +21,11 @@ from saltus.errors import MotionError, SaltusError
 from saltus.flow import (
     Motion,
     MotionRequest,
-    Program,
     SegmentColumn,
-    Sensitivities,
     Stop,
     derivatives_of,
+    follow,
     program,
-    simulate,
     state_rates,
 )
 from saltus.orbits.branches.beyond_events import (
@@ -50,6 +48,7 @@ from saltus.orbits.equations.event_sequence import STAYS, EventSequence, section
 from saltus.orbits.equations.sampled_motion import SampledMotion, modes_in
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
+from saltus.progress import silent
 from saltus.systems import System, arguments_of, held_values, image_of
 from saltus.taylor import FREQUENCY
 
@@ -219,9 +218,9 @@ class WholeMotionEquations(OrbitEquations):
             return None
         try:
             system = self.system_at(values)
-            state = arguments_of(system, self.start_state(unknowns, system))
-            time = float(self.signature.section or 0.0) / frequency
-            motion = simulate(system, **state, time=time, periods=self.signature.span, tol=self.tol, dense=False)
+            state = self.start_state(unknowns, system)
+            request, run = self._request(system, state, float(self.signature.section or 0.0) / frequency, values, None)
+            motion = follow(request, silent, run).motion
         except SaltusError:
             return None
         if motion.limit is not None:
@@ -240,7 +239,8 @@ class WholeMotionEquations(OrbitEquations):
         phase = float(self.signature.section or 0.0)
         try:
             system = self.system_at(values)
-            found = self._followed(system, self.start_state(unknowns, system), phase / frequency, values)
+            state = self.start_state(unknowns, system)
+            found = derivatives_of(*self._request(system, state, phase / frequency, values, self.paths))
         except SaltusError:  # such parameters or such a state are refused, or the motion is
             return None
         motion, parameters = found.motion, found.parameters.copy()
@@ -273,11 +273,18 @@ class WholeMotionEquations(OrbitEquations):
         return np.asarray(states[np.abs(states - near).max(axis=1).argmin()])
 
     @cached_property
-    def _program(self) -> Program:
+    def _program(self) -> Any:
         return program(self.system, sensitivities=self.paths)
 
-    def _followed(self, system: System, state: np.ndarray, time: float, values: np.ndarray) -> Sensitivities:
-        """The motion over the time that the equations cover, with its derivatives."""
+    @cached_property
+    def _plain_program(self) -> Any:
+        """The program without derivatives."""
+        return program(self.system)
+
+    def _request(
+        self, system: System, state: np.ndarray, time: float, values: np.ndarray, paths: tuple[str, ...] | None
+    ) -> tuple[MotionRequest, Any]:
+        """The motion over the time that the equations cover, dense if it has derivatives to `paths`, and its program."""
         names, own = system.model.coordinates, self.own
         parameters = self._values.copy()
         parameters[self._places] = values
@@ -291,11 +298,12 @@ class WholeMotionEquations(OrbitEquations):
             time=time,
             side=None,
             stop_at=(),
-            dense=True,
-            sensitivities=self.paths,
+            dense=paths is not None,
+            sensitivities=paths,
             dense_tangent=False,
         )
-        return derivatives_of(request, self._program.with_numbers(parameters, self._records))
+        run = self._plain_program if paths is None else self._program
+        return request, run.with_numbers(parameters, self._records)
 
     def _extremes(self, sampled: SampledMotion | None) -> np.ndarray:
         """The extrema of all coordinates and the least values of the margins, in the columns that other orbits use."""
