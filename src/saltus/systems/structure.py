@@ -214,13 +214,12 @@ class Structure(ContactModel):
         for name, value in made.items():
             object.__setattr__(self, name, value)
         object.__setattr__(self, "_modes", modes)
-        object.__setattr__(self, "_coordinates", (*local, *(f"{MODE}{i + 1}" for i in range(len(names) - len(local)))))
 
     @property
     def coordinates(self) -> tuple[str, ...]:  # type: ignore[override]
         """The local displacements, then the amplitudes of the modes."""
-        known: tuple[str, ...] = vars(self)["_coordinates"]
-        return known
+        local = self.form[0]
+        return (*local, *(f"{MODE}{i + 1}" for i in range(len(self.names) - len(local))))
 
     @property
     def channels(self) -> tuple[str, ...]:  # type: ignore[override]
