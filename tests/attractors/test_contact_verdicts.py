@@ -1,6 +1,8 @@
 """Verdicts on motions with several contacts: rest, orbits, chaos; their exponents."""
 
 import math
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -59,6 +61,31 @@ def test_many_exponents_between_two_walls_are_those_of_one():
         apart, error = np.abs(many["exponent"].values[row] - one.values), many["error"].values[row] + one.errors
         assert (apart < error).all()
     assert many["positive"].all()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bouncing(saltus.ContactModel):
+    """A ball over a shaking table."""
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+    channels: ClassVar[tuple[str, ...]] = ("ground",)
+    contacts = (saltus.Contact(name="table", coordinate={"x": 1.0, "ground": -1.0}),)
+
+    def force(self, t, x, velocity, load):
+        return -1.0
+
+
+def test_exponents_of_many_bounces_on_a_shaking_table_have_the_sum_of_their_loss():
+    """An impact a period shrinks areas by e^2; a bounce meets a sin(phase) with a cos(phase) = pi (1 - e) / (1 + e)."""
+    system = System(model=Bouncing(), load=Load(frequency=1.0, ground=Harmonic(1.0)), impact=NewtonImpact(e=0.6))
+    amplitudes = np.array([1.2, 1.25, 1.3])
+    many = lyapunov_many(system, {"load.ground.amplitude": amplitudes}, x=1.0, velocity=3.0, periods=64)
+    assert (many.period == 1).all()
+    np.testing.assert_allclose(many.exponent.sum("index"), 2 * math.log(0.6) / (2 * math.pi), rtol=0, atol=1e-9)
+    thrown = 2 * math.pi - np.arccos(math.pi / 4 / amplitudes)  # from the last impact to the end of the period
+    height = np.sqrt(amplitudes**2 - (math.pi / 4) ** 2)
+    np.testing.assert_allclose(many.end_x, height + math.pi * thrown - thrown**2 / 2, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(many.end_velocity, math.pi - thrown, rtol=0, atol=1e-8)
 
 
 def test_chaos_between_two_walls_has_the_exponent_of_two_neighbouring_motions():

@@ -191,21 +191,24 @@ def lyapunov_many(
     ['at_half', 'end_theta', 'end_velocity', 'ending', 'error', 'exponent', 'later_half', 'period', 'positive', 'resolution']
     """
     check_run("lyapunov_many", system, periods, transient, tol)
-    if len(system.model.coordinates) > 1 or system.in_gap_coordinates is not system:
+    if len(system.model.coordinates) > 1:
         raise ParameterError(
-            "lyapunov_many works on models with one coordinate and walls that stand still; lyapunov_spectrum takes any, one "
-            "motion at a time",
-            "system",
+            "lyapunov_many works on models with one coordinate; lyapunov_spectrum takes any, one motion at a time", "system"
         )
-    run = _Many(system, read_inputs(system, velocity, 0.0, parameters, coordinates), tol)
+    inputs = read_inputs(system, velocity, 0.0, parameters, coordinates)
+    run = _Many(system.in_gap_coordinates, inputs.in_gaps(system), tol)  # exponents are the same over a wall that moves
     started, captured = run.settle(run.begin(), transient)
     started[captured] = np.nan
     stretched = stretch_many(system, started, run.parameters, run.lengths, int(periods), tol, part_of(progress, 0.0, 0.95))
     period, still = run.period(stretched.states)
-    measures = _measures(system, run, stretched, captured, still) | {"period": period}
+    measures = _measures(run.system, run, stretched, captured, still) | {"period": period}
     measures["ending"][(measures["ending"] == Ending.UNDECIDED) & (period > 0)] = Ending.PERIODIC
     progress(1.0, "exponents")
-    return _dataset(run, measures, stretched.states, {"periods": periods, "transient": transient})
+    ends = stretched.states
+    if run.system is not system:
+        twin = inputs.with_numbers(run.system)
+        ends = np.concatenate(twin.model.own_states(0.0, ends[None, :, 0], ends[None, :, 1], twin.load)).T
+    return _dataset(system, run, measures, ends, {"periods": periods, "transient": transient})
 
 
 class _Many:
@@ -296,11 +299,13 @@ MEANINGS = {
 }
 
 
-def _dataset(run: _Many, measures: dict[str, np.ndarray], states: np.ndarray, numbers: dict[str, Any]) -> xarray.Dataset:
+def _dataset(
+    system: System, run: _Many, measures: dict[str, np.ndarray], states: np.ndarray, numbers: dict[str, Any]
+) -> xarray.Dataset:
     import xarray
 
-    inputs, name = run.inputs, run.system.model.coordinates[0]
-    unit = run.system.model.unit_of(name)
+    inputs, name = run.inputs, system.model.coordinates[0]
+    unit = system.model.unit_of(name)
     columns = {name: (array, "1", MEANINGS[name]) for name, array in measures.items()}
     for i, label in enumerate((name, "velocity")):
         columns[f"end_{label}"] = states[:, i], unit, f"{label} at the end, at phase 0 of the load"
@@ -313,6 +318,6 @@ def _dataset(run: _Many, measures: dict[str, np.ndarray], states: np.ndarray, nu
         variables[key] = dims, array.reshape((*inputs.shape, *array.shape[1:])), {"units": units, "long_name": text}
     variables["ending"][2].update(flags(Ending))
     attributes = {"title": "Lyapunov exponents computed by saltus", "kind": "lyapunov_many"} | provenance(
-        run.system, tol=run.tol, **numbers
+        system, tol=run.tol, **numbers
     )
     return xarray.Dataset(variables, coords=inputs.coords, attrs=attributes)

@@ -16,7 +16,7 @@ from saltus.flow.lanes.capture_speeds import capture_speeds
 from saltus.flow.lanes.compiled_lanes import compile_beside, compile_driver_aside, compile_everything, load_lane_functions
 from saltus.flow.lanes.ensemble_dataset import to_dataset
 from saltus.flow.lanes.ensemble_result import EnsembleResult
-from saltus.flow.lanes.inputs import Inputs, inputs_in_gaps, read_inputs
+from saltus.flow.lanes.inputs import Inputs, read_inputs
 from saltus.flow.lanes.memory import JOB
 from saltus.flow.lanes.options import EnsembleOptions, Sample, Until, read_last, read_names, read_side, read_threads
 from saltus.flow.lanes.threads import Jobs, Lanes
@@ -131,7 +131,7 @@ def run_ensemble(
 ) -> EnsembleResult:
     """Compile the code that is not there yet, and run the trajectories; `captured` holds speeds of capture that are known."""
     own, given = system, inputs
-    system, inputs = system.in_gap_coordinates, inputs_in_gaps(system, inputs)
+    system, inputs = system.in_gap_coordinates, inputs.in_gaps(system)
     driver = compile_driver_aside(system.model.holds_coordinates)
     run = program(system, options.limits, options.paths)
     jobs = _jobs(system, run, inputs, options.periods, duration, side)

@@ -54,6 +54,16 @@ class Inputs:
         """A copy of a system in which the numbers of the parameters are arrays, for what is no simulation."""
         return substitute(system, lambda path, value: self.parameters.get(path, value))
 
+    def in_gaps(self, system: System) -> Inputs:
+        """Those for `system.in_gap_coordinates`; the same object where that is the system itself."""
+        if (inner := system.in_gap_coordinates) is system:
+            return self
+        twin, own = self.with_numbers(inner), len(system.model.coordinates)
+        starts, rest = list(self.values.values())[: 2 * own], list(self.values.items())[2 * own :]
+        sums = twin.model.gap_states(self.values["time"], starts[:own], starts[own:], twin.load)
+        called = state_names(twin.model.coordinates)
+        return replace(self, values=dict(zip(called, [*sums[0], *sums[1]], strict=True)) | dict(rest))
+
 
 def read_inputs(system: System, velocity: Any, time: Any, parameters: Any, coordinates: Mapping[str, Any]) -> Inputs:
     """Broadcast and check the arguments of an ensemble.
@@ -72,17 +82,6 @@ def read_inputs(system: System, velocity: Any, time: Any, parameters: Any, coord
     size = math.prod(shape)
     check_memory(dims[0] if dims else "parameters", float(size) * LIMITS.motion, f"{size} motions at once")
     return Inputs(dims, shape, coords, together, tuple(given))
-
-
-def inputs_in_gaps(system: System, inputs: Inputs) -> Inputs:
-    """The inputs for `system.in_gap_coordinates`; the same object where that is the system itself."""
-    if (inner := system.in_gap_coordinates) is system:
-        return inputs
-    twin, own = inputs.with_numbers(inner), len(system.model.coordinates)
-    starts, rest = list(inputs.values.values())[: 2 * own], list(inputs.values.items())[2 * own :]
-    sums = twin.model.gap_states(inputs.values["time"], starts[:own], starts[own:], twin.load)
-    called = state_names(twin.model.coordinates)
-    return replace(inputs, values=dict(zip(called, [*sums[0], *sums[1]], strict=True)) | dict(rest))
 
 
 def _starts(system: System, velocity: Any, time: Any, coordinates: Mapping[str, Any]) -> dict[str, Any]:
