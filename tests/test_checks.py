@@ -31,6 +31,11 @@ def test_arguments_that_do_not_fit_are_refused_with_the_name_of_the_function(giv
         searched(*given, **named)
 
 
+def test_where_all_arguments_have_names_none_is_said_to_do_without():
+    with pytest.raises(ParameterError, match=r"^Contact\(\) too many positional arguments; give all arguments by their names$"):
+        saltus.Contact("wall", coordinate="x")
+
+
 @pytest.mark.parametrize("step", [0, -0.1, float("nan"), 1e4, "long"])
 def test_a_step_that_leads_nowhere_is_refused(step):
     forced = SYSTEM.with_({"load.horizontal": saltus.Harmonic(amplitude=0.5), "load.vertical": -0.5, "model.damping": 0.1})

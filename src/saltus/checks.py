@@ -478,7 +478,9 @@ def bound_arguments(function: Callable[..., Any], given: tuple[Any, ...], named:
         if sentence == "too many positional arguments":
             names = getattr(getattr(given[0], "model", None), "coordinates", ())
             example = ", ".join(f"{name}={shown(value, 20)}" for name, value in zip(names, given[1:], strict=False))
-            sentence += f"; give the arguments after the first by their names{f': {example}' if example else ''}"
+            first = any(p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD) for name, p in known.items() if name != "self")
+            those = "the arguments after the first" if first else "all arguments"
+            sentence += f"; give {those} by their names{f': {example}' if example else ''}"
         wrong = next((name for name in named if name not in known), None)
         if wrong is not None and not any(p.kind is p.VAR_KEYWORD for p in known.values()):
             sentence = f"has no argument {wrong!r:.40}; {near(wrong, [name for name in known if name != 'self'])}"

@@ -15,6 +15,7 @@ has a record of its coefficients.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
@@ -186,9 +187,11 @@ class Structure(ContactModel):
     forces: Any = None
     points: Any = None
     names: tuple[str, ...] = ()
-    coefficients: Any = None  # of the local equations, which follow from the matrices
-    records: Any = None  # those of the modes; without local displacements they are among the coefficients
-    form: Any = None  # which blocks of numbers the equations have, and the names of the local displacements; follows too
+    # What follows from the others: numbers of the local equations; those of the modes, which without local displacements are
+    # among the first; and which blocks of numbers there are, with the names of the local displacements.
+    coefficients: Any = dataclasses.field(default=None, repr=False)
+    records: Any = dataclasses.field(default=None, repr=False)
+    form: Any = dataclasses.field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         given = matrices_in(self.file, IN_FILES) if self.file else {name: getattr(self, name) for name in IN_FILES}
