@@ -576,10 +576,6 @@ def test_sums_without_meaning_are_refused_when_the_system_is_made(sentence):
 
 
 def test_what_cannot_be_followed_is_refused_when_the_system_is_made():
-    moving = Contact(name="a", coordinate={"x": 1.0, "ground": -1.0})
-    heavy = {"mass_matrix": lambda self, q: [[1.0 + q[0] ** 2, 0.0], [0.0, 1.0]]}
-    with pytest.raises(saltus.ParameterError, match="the mass matrix of Made depends on its coordinates"):
-        System(model=model_with(moving, body=heavy))
     rubbed = (Friction(name="f", coordinate="x", kinetic=0.1), Friction(name="g", coordinate="y", kinetic=0.1))
     with pytest.raises(saltus.ParameterError, match="which follows from what f, g keep"):
         System(model=model_with(Contact(name="a", coordinate=SUM), frictions=rubbed))

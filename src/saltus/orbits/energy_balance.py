@@ -243,7 +243,7 @@ def energies(of: Followed, *, periods: int | None = None) -> xarray.Dataset:
 def _refuse_moving_walls(system: System) -> None:
     """Refuse motions on which walls that move do work, in the coordinates in which they do."""
     inner: Any = system.in_gap_coordinates
-    if inner is not system and any(inner.model.sums()[1]):
+    if inner is not system and any(inner.model.gap_sums()[1]):
         raise ParameterError(
             "walls that move do work at contacts, which is not told apart: give a motion of system.in_gap_coordinates, whose "
             "energies are relative to the ground",
@@ -351,7 +351,10 @@ def _friction_parts(course: SampledPart, mass: np.ndarray, force: np.ndarray) ->
     holding = np.einsum("ijn,jn->in", mass, course.rate(course.velocity)) - force  # what makes a coordinate stick
     if inner is not system:  # each friction and each contact acts along one of its coordinates
         made: Any = touching
-        holding, velocity = np.array(made.from_gaps()).T @ holding, np.array(made.sums()[0]) @ velocity
+        place, rate = made.gap_values(course.time, load, *state)
+        columns = zip(*made.own_slopes(course.time, place, load), strict=True)
+        holding = [sum(share * each for share, each in zip(column, holding, strict=True)) for column in columns]
+        velocity = np.array(rate if isinstance(rate, tuple) else (rate,))
     slides = modes_of(touching, course.side)[1]
     for friction, normal, slide in zip(touching.frictions, normals, slides, strict=True):
         i, ground = touching.coordinates.index(friction.coordinate), friction.ground_speed

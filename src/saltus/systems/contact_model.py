@@ -13,7 +13,7 @@ import numpy as np
 
 from saltus.errors import ParameterError
 from saltus.systems.load import LoadOnSides, Sides
-from saltus.systems.model import Model
+from saltus.systems.model import Model, is_zero
 
 Number = Any  # a float, or a parameter of the model while its equations are traced
 
@@ -26,7 +26,8 @@ class Contact:
 
     Between bodies q is a sum of coordinates with constant coefficients, such as the distance y - x, and its reaction acts on each
     of them with its coefficient. A channel of the load that displaces the ground may be one of them: a wall that moves, or a
-    table that shakes, q = x - zeta(t).
+    table that shakes, q = x - zeta(t). So may functions h(q) of the coordinates, which are methods of the model: a corner, or a
+    wall that is curved.
 
     Parameters
     ----------
@@ -34,7 +35,8 @@ class Contact:
         Its name, such as "lower", in events and in the names of stops.
     coordinate
         The name of the model's coordinate; or a dictionary of the coefficients of several, {"y": 1.0, "x": -1.0} for y - x, and
-        of load channels whose names begin with "ground".
+        of load channels whose names begin with "ground", and of methods h(q) of the model. One coordinate at least must be read
+        by none of these; where none is, a method h_inverse(value) is needed that gives the single coordinate of which h is.
     sign
         +1 where the coordinate stays above the position, -1 where it stays below.
     position
@@ -50,6 +52,7 @@ class Contact:
     >>> right.gap(0.25)
     0.75
     >>> between = saltus.Contact(name="between", coordinate={"y": 1.0, "x": -1.0}, position=0.2)  # y - x >= 0.2
+    >>> corner = saltus.Contact(name="corner", coordinate={"y": 1.0, "depth": -1.0})  # y >= depth(q), a method of the model
     """
 
     name: str
@@ -482,7 +485,7 @@ def friction_margins(
         found[friction.limit] = force
         if friction.contact is not None:
             place, contact = names.index(friction.coordinate), _contact_of(model, friction)
-            own, across = schur_complement(mass_rows(model, q), place, names.index(contact.coordinate), free)
+            own, across = schur_complement(mass_rows(model, q, t, load), place, names.index(contact.coordinate), free)
             rubs = friction.most * (1.0 - free[names.index(contact.coordinate)]) * across
             found[friction.limit] = (own + contact.sign * s * rubs) * (own * own - (1.0 - s * s) * rubs * rubs)
     return found
@@ -513,12 +516,12 @@ def _lacking(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any) 
 def mass_and_force(model: Any, t: Any, q: Any, v: Any, load: Any) -> tuple[list[list[Any]], list[Any]]:
     """M(q) as rows and r(t, q, v) as a list, for any number of coordinates."""
     force = model.force(t, q, v, load, *sides_for(model, t, q, load))
-    return mass_rows(model, q), [force] if len(model.coordinates) == 1 else list(force)
+    return mass_rows(model, q, t, load), [force] if len(model.coordinates) == 1 else list(force)
 
 
-def mass_rows(model: Any, q: Any) -> list[list[Any]]:
-    """M(q) as rows, for any number of coordinates."""
-    mass = model.mass_matrix(q)
+def mass_rows(model: Any, q: Any, t: Any = 0.0, load: Any = None) -> list[list[Any]]:
+    """M(q) as rows, for any number of coordinates; where walls move it depends on time, without a load as if none moved."""
+    mass = model.mass_matrix(q, t, load) if getattr(model, "has_moving_walls", False) else model.mass_matrix(q)
     return [[mass]] if len(model.coordinates) == 1 else [list(row) for row in mass]
 
 
@@ -538,13 +541,15 @@ def sides_for(model: Any, t: Any, q: Any, load: Any) -> tuple[Sides, ...]:
         return (load.sides,)
     known = dict(zip(model.coordinates, q if len(model.coordinates) > 1 else (q,), strict=True))
 
+    def value_of(name: str) -> Any:
+        """The value of a term of a sum: a coordinate, a displacement of the ground or a function of the model."""
+        return known[name] if name in known else getattr(load, name)(t) if name in model.channels else getattr(model, name)(q)
+
     def kept(surface: Surface) -> Any:
         """The coordinate of a surface, or its sum."""
         if isinstance(surface.coordinate, str):
             return known[surface.coordinate]
-        return sum(
-            factor * (known[name] if name in known else getattr(load, name)(t)) for name, factor in surface.coordinate.items()
-        )
+        return sum(factor * value_of(name) for name, factor in surface.coordinate.items())
 
     return (Sides({each.name: each.side(kept(each)) for each in model.surfaces}),)
 
@@ -554,8 +559,3 @@ def _held(entry: Any, i: int, j: int, free: Sequence[Any]) -> Any:
     if i != j:
         return 0.0 if is_zero(entry) else free[i] * free[j] * entry
     return 1.0 if isinstance(entry, float) and entry == 1.0 else free[i] * entry + (1.0 - free[i])
-
-
-def is_zero(entry: Any) -> bool:
-    """Whether an entry is 0 for every state: the number 0, and not a symbol or an array."""
-    return isinstance(entry, (int, float)) and entry == 0

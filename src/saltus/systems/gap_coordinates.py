@@ -15,9 +15,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from saltus.errors import ParameterError
-from saltus.systems.contact_model import Contact, ContactModel, Friction, Surface, is_zero
+from saltus.systems.contact_model import Contact, ContactModel, Friction, Surface
+from saltus.systems.load import Load
+from saltus.systems.model import Jet, as_given, derivatives_along, each_of, is_function, is_zero, less, reads_of, weighted
 
 Part = Contact | Surface | Friction
+INVERSE = "_inverse"  # behind the name of a model's function, the name of its inverse
 CLOSED_BELOW = 1e-13  # A contact is closed, up to rounding, if both its gap and its speed are smaller than this.
 
 
@@ -30,20 +33,23 @@ class GapPlaces:
     contacts: tuple[tuple[int, int], ...]  # the place of each contact's sum, and +1, or -1 if the coordinate is minus the sum
     surfaces: tuple[tuple[int, int], ...]  # of each surface likewise
     frictions: tuple[tuple[int, int], ...]  # and of each friction
+    solved: tuple[tuple[int, tuple[str, ...]], ...]  # the coordinates in the order of solving, with the functions that each needs
+    stands: tuple[tuple[int, str], ...]  # places of coordinates, with the functions of them alone that stand for them
 
 
 class InGapCoordinates(ContactModel):
-    """A model in which sums z = A q + m(t) that its contacts keep on one side take the place of coordinates q = T (z - m):
+    """A model in which sums z = A q + h(q) + m(t) that its contacts keep on one side take the place of coordinates q:
 
-        T' M T z'' = T' (r - M q_0'') + the reactions,    T = A^-1,    q_0 = -T m(t).
+        T' M T z'' = T' (r - M a) + the reactions,    T = dq/dz,    a = q'' where z'' = 0.
 
-    Each contact then holds one coordinate, and its position stays constant where a wall moves. Its classes are made of a model's
-    own by `in_gap_coordinates`, with the same numbers under the same names.
+    Functions h read coordinates that follow without them, so that all follow one after the other; derivatives of them are exact
+    (`Jet`). Each contact then holds one coordinate, and its position stays constant where a wall moves. Its classes are made of a
+    model's own by `in_gap_coordinates`, with the same numbers under the same names.
     """
 
     __slots__ = ()
 
-    places: ClassVar[GapPlaces]
+    gap_places: ClassVar[GapPlaces]
     own_class: ClassVar[Any]  # the class of the model that the user gave
 
     def __reduce__(self) -> Any:
@@ -56,17 +62,17 @@ class InGapCoordinates(ContactModel):
     @property
     def contacts(self) -> tuple[Contact, ...]:
         """The contacts, each of which holds one of the coordinates."""
-        return self._on_coordinates(super().contacts, self.places.contacts)
+        return self._on_coordinates(super().contacts, self.gap_places.contacts)
 
     @property
     def surfaces(self) -> tuple[Surface, ...]:
         """The surfaces, each of one of the coordinates."""
-        return self._on_coordinates(super().surfaces, self.places.surfaces)
+        return self._on_coordinates(super().surfaces, self.gap_places.surfaces)
 
     @property
     def frictions(self) -> tuple[Friction, ...]:
         """The frictions, each along one of the coordinates."""
-        places = zip(super().frictions, self.places.frictions, strict=True)
+        places = zip(super().frictions, self.gap_places.frictions, strict=True)
         return tuple(
             replace(part, coordinate=self.coordinates[i], ground_speed=part.ground_speed if s > 0 else -part.ground_speed)
             for part, (i, s) in places
@@ -85,53 +91,96 @@ class InGapCoordinates(ContactModel):
         return self.coordinates
 
     def mirror(self, load: Any) -> Any:
-        """That of the model as it was given, unless its mirror images swap coordinates."""
-        return super().mirror(load) if self.own_class.images is ContactModel.images else None
+        """That of the model as it was given, unless its mirror images swap coordinates or functions of them are in sums."""
+        return None if self.is_bent or self.own_class.images is not ContactModel.images else super().mirror(load)
 
-    def sums(self) -> tuple[list[list[Any]], list[dict[str, Any]]]:
-        """A as rows, and for each row the coefficients of load channels in m(t)."""
-        names = super().coordinates
+    def gap_sums(self) -> tuple[list[list[Any]], list[dict[str, Any]], list[dict[str, Any]]]:
+        """A as rows, and for each row the coefficients of load channels in m(t) and of functions in h(q)."""
+        names = columns_of(super().coordinates, self.gap_places.stands)
         rows = [[float(i == j) for j in range(len(names))] for i in range(len(names))]
-        moving: list[dict[str, Any]] = [{} for _ in names]
+        moving, bending = ([dict[str, Any]() for _ in names] for _ in range(2))
         parts: list[Part] = [*super().contacts, *super().surfaces, *super().frictions]
-        places = self.places.contacts + self.places.surfaces + self.places.frictions
+        places = self.gap_places.contacts + self.gap_places.surfaces + self.gap_places.frictions
         for part, (i, sign) in zip(parts, places, strict=True):
-            if sign > 0 and i in self.places.order:
+            if sign > 0 and i in self.gap_places.order:
                 given = terms_of(part)
                 rows[i] = [given.get(name, 0.0) for name in names]
-                moving[i] = {name: factor for name, factor in given.items() if name not in names}
-        return rows, moving
+                moving[i] = {name: factor for name, factor in given.items() if name in self.channels}
+                bending[i] = {name: factor for name, factor in given.items() if name not in (*names, *self.channels)}
+        return rows, moving, bending
 
-    def from_gaps(self) -> list[list[Any]]:
-        """T as rows."""
-        rows, _ = self.sums()
-        return _inverse(rows, self.places.order)
+    @property
+    def is_bent(self) -> bool:
+        """Whether a sum has functions of coordinates among its terms, so that T depends on them."""
+        return bool(self.gap_places.stands) or any(needed for _, needed in self.gap_places.solved)
 
-    def shift(self, t: Any, load: Any, order: int = 0) -> list[Any]:
+    @property
+    def has_moving_walls(self) -> bool:
+        """Whether a sum has a displacement of the ground among its terms."""
+        return any(self.gap_sums()[1])
+
+    def walls_at(self, t: Any, load: Any, order: int = 0) -> list[Any]:
         """m(t) or one of its first two derivatives."""
         rates = (lambda channel: channel(t), lambda channel: channel.velocity(t), lambda channel: channel.acceleration(t))
-        _, moving = self.sums()
-        return [_weighted(list(m.values()), [rates[order](getattr(load, name)) for name in m]) for m in moving]
+        return [weighted(list(m.values()), [rates[order](getattr(load, name)) for name in m]) for m in self.gap_sums()[1]]
 
-    def own(self, t: Any, values: Any, load: Any, order: int = 0) -> Any:
-        """The user's coordinates, or their first or second derivatives, where those of this model have these values."""
-        given = values if len(self.coordinates) > 1 else [values]
-        moved = [z if is_zero(m) else z - m for z, m in zip(given, self.shift(t, load, order), strict=True)]
-        return _as_given([_weighted(row, moved) for row in self.from_gaps()])
+    def own_values(self, t: Any, load: Any, *given: Any) -> list[Any]:
+        """The user's coordinates and as many of their derivatives as are given of those of this model, two at most."""
+        moved = [less(each_of(values), self.walls_at(t, load, order)) for order, values in enumerate(given)]
+        if not self.is_bent:
+            back = inverse(self.gap_sums()[0], self.gap_places.order)
+            return [as_given([weighted(row, values) for row in back]) for values in moved]
+        return derivatives_along(self._solved, moved)
 
-    def in_gaps(self, t: Any, values: Any, load: Any, order: int = 0) -> Any:
-        """The inverse of `own`."""
-        sums = [_weighted(row, values if len(self.coordinates) > 1 else [values]) for row in self.sums()[0]]
-        return _as_given([z if is_zero(m) else z + m for z, m in zip(sums, self.shift(t, load, order), strict=True)])
+    def gap_values(self, t: Any, load: Any, *given: Any) -> list[Any]:
+        """The inverse of `own_values`."""
+        found = [each_of(values) for values in derivatives_along(self._summed, [each_of(values) for values in given])]
+        moved = [[-m for m in self.walls_at(t, load, order)] for order in range(len(found))]
+        return [as_given(less(values, m)) for values, m in zip(found, moved, strict=True)]
+
+    def _summed(self, q: list[Any]) -> list[Any]:
+        """A q + h(q)."""
+        rows, _, bending = self.gap_sums()
+        u, stands = list(q), dict(self.gap_places.stands)
+        for place, name in stands.items():
+            u[place] = self._function(name, q)
+        bent = [weighted(list(terms.values()), [self._function(name, q) for name in terms]) for terms in bending]
+        return [weighted((*row, 1.0), (*u, more)) for row, more in zip(rows, bent, strict=True)]
+
+    def _solved(self, sums: list[Any]) -> list[Any]:
+        """The coordinates q of which A q + h(q) are these sums."""
+        rows, _, bending = self.gap_sums()
+        back, stands, q = inverse(rows, self.gap_places.order), dict(self.gap_places.stands), [0.0] * len(sums)
+        for place, needed in self.gap_places.solved:
+            row, q[place] = back[place], weighted(back[place], sums)
+            for name in needed:
+                factor = weighted(row, [terms.get(name, 0.0) for terms in bending])
+                q[place] = q[place] - factor * self._function(name, q)
+            if place in stands:
+                q[place] = getattr(self, stands[place] + INVERSE)(q[place])
+        return q
+
+    def _function(self, name: str, q: list[Any]) -> Any:
+        """The value of a function of the model at its own coordinates."""
+        return getattr(self, name)(as_given(q))
+
+    def own_slopes(self, t: Any, theta: Any, load: Any) -> list[list[Any]]:
+        """T = dq/dz as rows."""
+        if not self.is_bent:
+            return inverse(self.gap_sums()[0], self.gap_places.order)
+        z, size = less(each_of(theta), self.walls_at(t, load)), range(len(self.coordinates))
+        columns = [self._solved([Jet(x, float(i == k)) for i, x in enumerate(z)]) for k in size]
+        return [[column[j].first for column in columns] for j in size]
 
     def own_states(self, t: Any, position: Any, velocity: Any, load: Any) -> tuple[np.ndarray, np.ndarray]:
         """Coordinates and velocities of the model as it was given, a row for each coordinate."""
-        return _stacked(self.own(t, _values(position), load)), _stacked(self.own(t, _values(velocity), load, 1))
+        q, v = self.own_values(t, load, _values(position), _values(velocity))
+        return _stacked(q), _stacked(v)
 
     def gap_states(self, t: Any, position: Any, velocity: Any, load: Any) -> tuple[np.ndarray, np.ndarray]:
         """The inverse of `own_states`, in which what contacts hold up to rounding is held exactly."""
-        places, rates = self.in_gaps(t, _values(position), load), self.in_gaps(t, _values(velocity), load, 1)
-        q, v = np.split(_stacked([*_each_of(places), *_each_of(rates)]), 2)
+        places, rates = self.gap_values(t, load, _values(position), _values(velocity))
+        q, v = np.split(_stacked([*each_of(places), *each_of(rates)]), 2)
         for contact in self.contacts:
             place, at = self.coordinates.index(contact.coordinate), np.asarray(contact.position, dtype=float)
             there = np.abs(q[place] - at) <= CLOSED_BELOW * (1.0 + np.abs(q).max(axis=0))
@@ -139,42 +188,42 @@ class InGapCoordinates(ContactModel):
             q[place], v[place] = np.where(there, at, q[place]), np.where(still, 0.0, v[place])
         return q, v
 
-    def mass_matrix(self, theta: Any) -> Any:
-        """T' M T; M may depend on the coordinates only where no wall moves."""
-        back = self.from_gaps()
-        columns = list(zip(*back, strict=True))
-        q = _as_given([_weighted(row, _each_of(theta)) for row in back])
-        right = [[_weighted(row, column) for column in columns] for row in _rows_of(super().mass_matrix(q))]  # M T
-        return _as_given(
-            [_as_given([_weighted(column, [row[j] for row in right]) for j in range(len(back))]) for column in columns]
+    def mass_matrix(self, theta: Any, t: Any = 0.0, load: Any = None) -> Any:
+        """T' M T; without a load where no wall has moved."""
+        load = load or Load()
+        (q,), slopes = self.own_values(t, load, theta), self.own_slopes(t, theta, load)
+        columns = list(zip(*slopes, strict=True))
+        right = [[weighted(row, column) for column in columns] for row in _rows_of(super().mass_matrix(q))]  # M T
+        return as_given(
+            [as_given([weighted(column, [row[j] for row in right]) for j in range(len(slopes))]) for column in columns]
         )
 
     def force(self, t: Any, theta: Any, velocity: Any, load: Any, *sides: Any) -> Any:
-        """T' (r - M q_0'')."""
-        q, v = self.own(t, theta, load), self.own(t, velocity, load, 1)
-        pushed, mass = _each_of(super().force(t, q, v, load, *sides)), _rows_of(super().mass_matrix(q))
-        carried = _each_of(self.own(t, _as_given([0.0] * len(pushed)), load, 2))
-        inertia = [_weighted(row, carried) for row in mass]
-        pushed = [f if is_zero(a) else f - a for f, a in zip(pushed, inertia, strict=True)]
-        return _as_given([_weighted(column, pushed) for column in zip(*self.from_gaps(), strict=True)])
+        """T' (r - M a), where a is q'' for z'' = 0."""
+        q, v, carried = self.own_values(t, load, theta, velocity, as_given([0.0] * len(self.coordinates)))
+        pushed, mass = each_of(super().force(t, q, v, load, *sides)), _rows_of(super().mass_matrix(q))
+        pushed = less(pushed, [weighted(row, each_of(carried)) for row in mass])
+        return as_given([weighted(column, pushed) for column in zip(*self.own_slopes(t, theta, load), strict=True)])
 
     def normal_forces(self, t: Any, theta: Any, velocity: Any, load: Any) -> tuple[Any, ...]:
         """Those of the model as it was given."""
-        return super().normal_forces(t, self.own(t, theta, load), self.own(t, velocity, load, 1), load)
+        q, v = self.own_values(t, load, theta, velocity)
+        return super().normal_forces(t, q, v, load)
 
     def after_impact(self, contact: str, theta: Any, velocity: Any) -> Any:
         """That of the model as it was given; none has one where a wall moves, as it would not be told its velocity."""
         if not self.jumps:
             return tuple(theta[len(self.moving) :])
-        return super().after_impact(contact, self.own(0.0, theta, None), self.own(0.0, velocity, None, 1))
+        return super().after_impact(contact, *self.own_values(0.0, None, theta, velocity))
 
     def kinetic_energy(self, t: Any, theta: Any, velocity: Any, side: Any, load: Any) -> Any:
         """That of the model as it was given."""
-        return super().kinetic_energy(t, self.own(t, theta, load), self.own(t, velocity, load, 1), side, load)
+        q, v = self.own_values(t, load, theta, velocity)
+        return super().kinetic_energy(t, q, v, side, load)
 
     def margins(self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Any) -> dict[str, Any]:
         """Those of the model as it was given."""
-        q, v, a = (self.own(t, values, load, order) for order, values in enumerate((theta, velocity, acceleration)))
+        q, v, a = self.own_values(t, load, theta, velocity, acceleration)
         return super().margins(t, q, v, a, side, load)
 
 
@@ -186,10 +235,14 @@ def in_gap_coordinates(model: Any) -> Any:
     ParameterError
         The sum that a contact keeps follows from those of others, or needs the coordinate of a friction.
     """
-    places = _places_of(model)
+    places = places_of(model)
     if places is None:
         return model
     kind: Any = type(model)
+    if taken := {name for name in (*vars(InGapCoordinates), "own_class") if name not in dir(ContactModel)} & {*dir(kind)}:
+        raise ParameterError(
+            f"{kind.__name__} has a part named {min(taken)}, which saltus gives to models with sums: rename it", "model"
+        )
     made = object.__new__(_class_in(kind, places))  # its numbers have been checked
     for field in fields(model):
         object.__setattr__(made, field.name, getattr(model, field.name))
@@ -200,7 +253,7 @@ def in_gap_coordinates(model: Any) -> Any:
 def _class_in(cls: Any, places: GapPlaces) -> Any:
     """The class of a model in coordinates of its gaps: a subclass with the same fields."""
     body: dict[str, Any] = {"__slots__": (), "__doc__": f"{cls.__name__} in coordinates of its gaps.", "__module__": __name__}
-    body |= {"places": places, "own_class": cls, "coordinates": places.names}
+    body |= {"gap_places": places, "own_class": cls, "coordinates": places.names}
     return type(cls.__name__ + IN_GAPS, (InGapCoordinates, cls), body)
 
 
@@ -212,47 +265,100 @@ def terms_of(contact: Part) -> dict[str, Any]:
     return {contact.coordinate: 1.0} if isinstance(contact.coordinate, str) else dict(contact.coordinate)
 
 
-def _places_of(model: Any) -> GapPlaces | None:
+def places_of(model: Any) -> GapPlaces | None:
     """Which coordinates the sums of a model's contacts take the place of; None if each contact holds a single coordinate.
 
-    Each sum takes the place of that of its coordinates which has the largest coefficient after the elimination of the earlier
-    sums, of several the last. Coordinates that a contact holds alone, or along which a friction acts, keep their places.
+    Functions that stand for the coordinate on which they depend are tried only if there is no other way.
     """
-    contacts, names, order = (*model.contacts, *model.surfaces, *model.frictions), model.coordinates, []
-    if all(isinstance(contact.coordinate, str) for contact in contacts):
+    parts: tuple[Part, ...] = (*model.contacts, *model.surfaces, *model.frictions)
+    if all(isinstance(part.coordinate, str) for part in parts):
         return None
-    called, found = list(names), dict[int, tuple[int, int]]()
-    rows = {names.index(part.coordinate): {part.coordinate: 1.0} for part in contacts if isinstance(part.coordinate, str)}
+    reads = {name: reads_of(model, name) for part in parts for name in terms_of(part) if is_function(model, name)}
+    found = _placed(model, parts, reads, {})
+    stands = {places[0]: name for name, places in reads.items() if len(places) == 1 and hasattr(model, name + INVERSE)}
+    if isinstance(found, str) and stands:
+        found = _placed(model, parts, reads, stands)
+    if isinstance(found, str):
+        raise ParameterError(found, "model")
+    return found
+
+
+def _placed(model: Any, parts: Sequence[Part], reads: dict[str, tuple[int, ...]], stands: dict[int, str]) -> GapPlaces | str:
+    """The places of sums, or why there are none. Each takes that of the coordinate with the largest coefficient, of several the
+    last, after the elimination of earlier sums, which none of its functions reads and which no part holds alone."""
+    names = columns_of(model.coordinates, tuple(stands.items()))
+    columns = [*names, *(name for name in reads if name not in names)]
+    called, found, order = list(names), dict[int, tuple[int, int]](), list[int]()
+    alone = {part.coordinate for part in parts if isinstance(part.coordinate, str)}
+    rows = {names.index(name): {name: 1.0} for name in alone if name in names}
     reduced = dict[int, list[Fraction]]()
-    for number, contact in enumerate(contacts):
-        terms = {name: float(factor) for name, factor in terms_of(contact).items()}
+    for number, part in enumerate(parts):
+        terms = {name: float(factor) for name, factor in terms_of(part).items()}
         turned = {name: -factor for name, factor in terms.items()}
         same = [(place, 1 if terms == row else -1) for place, row in rows.items() if row in (terms, turned)]
         if not same:
-            left = [Fraction(terms.get(name, 0.0)) for name in names]
+            left = [Fraction(terms.get(name, 0.0)) for name in columns]
             for place, row in reduced.items():
                 left = [a - left[place] * b for a, b in zip(left, row, strict=True)]
-            free = [place for place in range(len(names)) if left[place] and place not in rows]
-            if not free:
-                raise ParameterError(_no_place(contact, contacts), "model")
+            read = {
+                place
+                for name, share in zip(columns[len(names) :], left[len(names) :], strict=True)
+                if share
+                for place in reads[name]
+            }
+            free = [place for place in range(len(names)) if left[place] and place not in rows and place not in read]
+            if not free or any(name in model.coordinates and name not in names for name in terms):
+                return _no_place(part, parts, reads)
             place = max(free, key=lambda place: (abs(left[place]), place))
-            rows[place], reduced[place], called[place] = terms, [a / left[place] for a in left], _called(contact)
+            rows[place], reduced[place], called[place] = terms, [a / left[place] for a in left], _called(part)
             order.append(place)
             same = [(place, 1)]
         found[number] = same[0]
+    solved = _order_of_solving(names, [rows.get(place, {name: 1.0}) for place, name in enumerate(names)], order, reads)
+    if solved is None:
+        return _no_place(parts[-1], parts, reads)
     count, every = len(model.contacts), tuple(found.values())
     last = count + len(model.surfaces)
-    return GapPlaces(tuple(called), tuple(order), every[:count], every[count:last], every[last:])
+    return GapPlaces(tuple(called), tuple(order), every[:count], every[count:last], every[last:], solved, tuple(stands.items()))
 
 
-def _no_place(contact: Part, contacts: Sequence[Part]) -> str:
-    """Why a contact's sum cannot be a coordinate, in words."""
-    others = ", ".join(other.name for other in contacts if other is not contact)
-    kept = _called(contact)
+def _order_of_solving(
+    names: Sequence[str], rows: list[dict[str, float]], order: Sequence[int], reads: dict[str, tuple[int, ...]]
+) -> tuple[tuple[int, tuple[str, ...]], ...] | None:
+    """The coordinates in an order in which each follows from sums and from functions of those before it, or None."""
+    back = inverse([[Fraction(row.get(name, 0.0)) for name in names] for row in rows], order, Fraction(1))
+    shares = [{f: sum(t * Fraction(row.get(f, 0.0)) for t, row in zip(ts, rows, strict=True)) for f in reads} for ts in back]
+    needed = [tuple(f for f, share in each.items() if share and f not in names) for each in shares]
+    found, left = list[tuple[int, tuple[str, ...]]](), list(range(len(names)))
+    while left:
+        known = {place for place, _ in found}
+        ready = [place for place in left if all(known.issuperset(reads[f]) for f in needed[place])]
+        if not ready:
+            return None
+        found.append((ready[0], needed[ready[0]]))
+        left.remove(ready[0])
+    return tuple(found)
+
+
+def columns_of(names: Sequence[str], stands: Any) -> list[str]:
+    """The coordinates, and in the places of some of them the functions that stand for them."""
+    return [dict(stands).get(place, name) for place, name in enumerate(names)]
+
+
+def _no_place(part: Part, parts: Sequence[Part], reads: dict[str, tuple[int, ...]]) -> str:
+    """Why a part's sum cannot be a coordinate, in words."""
+    others = ", ".join(other.name for other in parts if other is not part)
+    kept, names = _called(part), [name for name in terms_of(part) if name in reads]
+    what = f"the {type(part).__name__.lower()} {part.name!r} keeps {kept}"
+    if names:
+        return (
+            f"{what}, and needs a coordinate of its own, with a constant coefficient and read by none of its functions: let it "
+            f"keep a coordinate where its gap is 0, or, if {names[0]} is of one coordinate alone, give the model "
+            f"{names[0]}{INVERSE}(value), the coordinate at which {names[0]} has this value"
+        )
     return (
-        f"the {type(contact).__name__.lower()} {contact.name!r} keeps {kept}, which follows from what {others} keep, up "
-        "to a displacement, so that it cannot be a coordinate beside them; leave it out, give sums that are the same the "
-        "same coefficients, or let it keep a coordinate of its own, such as that of a heavy wall"
+        f"{what}, which follows from what {others} keep, up to a displacement, so that it cannot be a coordinate beside them; "
+        "leave it out, give sums that are the same the same coefficients, or let it keep one of its own, as of a heavy wall"
     )
 
 
@@ -265,10 +371,10 @@ def _called(contact: Part) -> str:
     return "_".join(("minus_" if terms[name] < 0.0 else "plus_") + name for name in ranked).removeprefix("plus_")
 
 
-def _inverse(rows: list[list[Any]], order: Sequence[int]) -> list[list[Any]]:
+def inverse(rows: list[list[Any]], order: Sequence[int], one: Any = 1.0) -> list[list[Any]]:
     """The inverse of a matrix whose rows are those of the unit matrix, except for those in `order`."""
     size = len(rows)
-    left, right = [list(row) for row in rows], [[float(i == j) for j in range(size)] for i in range(size)]
+    left, right = [list(row) for row in rows], [[one * (i == j) for j in range(size)] for i in range(size)]
     for k in (*order, *(k for k in range(size) if k not in order)):
         pivot = left[k][k]
         if not (isinstance(pivot, float) and pivot == 1.0):
@@ -281,34 +387,14 @@ def _inverse(rows: list[list[Any]], order: Sequence[int]) -> list[list[Any]]:
     return right
 
 
-def _weighted(factors: Sequence[Any], values: Sequence[Any]) -> Any:
-    """The sum of products, without those that are 0 for every state."""
-    total: Any = 0.0
-    for factor, value in zip(factors, values, strict=True):
-        if not (is_zero(factor) or is_zero(value)):
-            term = value if isinstance(factor, float) and factor == 1.0 else factor * value
-            total = term if is_zero(total) else total + term
-    return total
-
-
-def _as_given(values: list[Any]) -> Any:
-    """One value, or a tuple of several."""
-    return values[0] if len(values) == 1 else tuple(values)
-
-
 def _values(given: Any) -> Any:
     """A number or an array for each coordinate, as `_as_given`."""
-    return _as_given([*np.atleast_1d(given)] if isinstance(given, np.ndarray) else _each_of(given))
+    return as_given([*np.atleast_1d(given)] if isinstance(given, np.ndarray) else each_of(given))
 
 
 def _stacked(values: Any) -> np.ndarray:
     """A row for each coordinate."""
-    return np.stack(np.broadcast_arrays(*_each_of(values)))
-
-
-def _each_of(values: Any) -> list[Any]:
-    """The values of all coordinates, of one or of several."""
-    return list(values) if isinstance(values, (tuple, list)) else [values]
+    return np.stack(np.broadcast_arrays(*each_of(values)))
 
 
 def _rows_of(mass: Any) -> list[list[Any]]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from saltus.errors import ParameterError, near, shown
+from saltus.errors import ParameterError, TraceError, near, shown
 
 if TYPE_CHECKING:
     from saltus.systems.contact_model import Contact, Friction, Surface
@@ -416,3 +416,126 @@ def check_one_contact(model: OneContactModel | type[OneContactModel]) -> None:
             "such as return side, -impact.velocity_after(self, t, velocity, side, side, load)",
             "model",
         )
+
+
+# --- derivatives of functions of the coordinates ---------------------------------------------------------------------------
+
+SCALES = (0.21, 0.0, 1.3, -0.4)  # of states at which functions are tried; one in their domain is needed
+
+# By the name of NumPy's function, its derivatives to its arguments, as functions of these and of its value.
+SLOPES: dict[str, tuple[Callable[..., Any], ...]] = {
+    "add": (lambda a, b, y: 1.0, lambda a, b, y: 1.0),
+    "subtract": (lambda a, b, y: 1.0, lambda a, b, y: -1.0),
+    "multiply": (lambda a, b, y: b, lambda a, b, y: a),
+    "divide": (lambda a, b, y: 1.0 / b, lambda a, b, y: -y / b),
+    "power": (lambda a, b, y: b * a ** (b - 1.0), lambda a, b, y: y * np.log(a)),
+    "negative": (lambda u, y: -1.0,),
+    "square": (lambda u, y: 2.0 * u,),
+    "sqrt": (lambda u, y: 0.5 / y,),
+    "exp": (lambda u, y: y,),
+    "log": (lambda u, y: 1.0 / u,),
+    "sin": (lambda u, y: np.cos(u),),
+    "cos": (lambda u, y: -np.sin(u),),
+    "tan": (lambda u, y: 1.0 + y * y,),
+    "sinh": (lambda u, y: np.cosh(u),),
+    "cosh": (lambda u, y: np.sinh(u),),
+    "tanh": (lambda u, y: 1.0 - y * y,),
+    "arctan": (lambda u, y: 1.0 / (1.0 + u * u),),
+}
+
+
+class Jet(np.lib.mixins.NDArrayOperatorsMixin):
+    """A number, an array or a symbol along a curve, with its first derivative there and, if that is asked for, its second one."""
+
+    __slots__ = ("first", "second", "value")
+    __array_priority__ = 2000  # above that of symbols, which it may hold
+
+    def __init__(self, value: Any, first: Any, second: Any = None) -> None:
+        self.value, self.first, self.second = value, first, second
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **kwargs: Any) -> Jet:
+        slopes = SLOPES.get(ufunc.__name__)
+        if method != "__call__" or kwargs or slopes is None:
+            raise TraceError(f"np.{ufunc.__name__} of coordinates has no derivative here; known are {', '.join(SLOPES)}")
+        jets = [x if isinstance(x, Jet) else Jet(x, 0.0, 0.0) for x in inputs]
+        values, known = [x.value for x in jets], all(x.second is not None for x in jets)
+        moving = [not (is_zero(x.first) and (x.second is None or is_zero(x.second))) for x in jets]
+        y, firsts = ufunc(*values), [x.first for x in jets]
+        steep = [slope(*values, y) if moves else 0.0 for slope, moves in zip(slopes, moving, strict=True)]
+        first = weighted(steep, firsts)
+        if not known:
+            return Jet(y, first)
+        along = [*(Jet(x.value, x.first) for x in jets), Jet(y, first)]
+        bent = [slope(*along) if moves else 0.0 for slope, moves in zip(slopes, moving, strict=True)]
+        turned = [x.first if isinstance(x, Jet) else 0.0 for x in bent]
+        return Jet(y, first, weighted([*steep, *turned], [*(x.second for x in jets), *firsts]))
+
+    def __float__(self) -> float:
+        raise TraceError("a coordinate has no plain number here: use NumPy's functions, not math's")
+
+    __array__ = __float__
+
+
+def weighted(factors: Sequence[Any], values: Sequence[Any]) -> Any:
+    """The sum of products, without those that are 0 for every state."""
+    total: Any = 0.0
+    for factor, value in zip(factors, values, strict=True):
+        if not (is_zero(factor) or is_zero(value)):
+            term = value if isinstance(factor, float) and factor == 1.0 else factor * value
+            total = term if is_zero(total) else total + term
+    return total
+
+
+def is_zero(entry: Any) -> bool:
+    """Whether an entry is 0 for every state: the number 0, and not a symbol or an array."""
+    return isinstance(entry, (int, float)) and entry == 0
+
+
+def derivatives_along(function: Any, given: list[list[Any]]) -> list[Any]:
+    """A function of a point, and the first and second derivatives of its value where those of the point are given too."""
+    if len(given) == 1:
+        return [as_given(function(given[0]))]
+    found = function([Jet(*each) for each in zip(*given, strict=True)])
+    return [as_given([getattr(x, name) for x in found]) for name in ("value", "first", "second")[: len(given)]]
+
+
+def is_function(model: Any, name: str) -> bool:
+    """Whether a term of a sum is a function of the model."""
+    return name not in model.coordinates and name not in model.channels
+
+
+def reads_of(model: Any, name: str) -> tuple[int, ...]:
+    """The places of the coordinates on which a function of a model depends.
+
+    Raises
+    ------
+    ParameterError
+        It has no value, or none at numbers with derivatives.
+    """
+    size, what = len(model.coordinates), f"{type(model).__name__}.{name}"
+    try:
+        for scale in SCALES:
+            q = [scale / (1 + i) for i in range(size)]
+            with np.errstate(all="ignore"):
+                if np.isfinite(float(getattr(model, name)(as_given(q)))):
+                    derivatives_along(lambda x: [getattr(model, name)(as_given(x))], [q, [1.0] * size, [0.0] * size])
+                    beside = [[np.nan if i == j else x for i, x in enumerate(q)] for j in range(size)]
+                    return tuple(j for j, x in enumerate(beside) if np.isnan(float(getattr(model, name)(as_given(x)))))
+    except Exception as error:  # a user's own code may raise anything
+        raise ParameterError(f"{what} fails: {type(error).__name__}: {error}; it takes the coordinates q", "model") from error
+    raise ParameterError(f"{what} must return a number at the coordinates q, and has none at {shown(q)}", "model")
+
+
+def as_given(values: list[Any]) -> Any:
+    """One value, or a tuple of several."""
+    return values[0] if len(values) == 1 else tuple(values)
+
+
+def each_of(values: Any) -> list[Any]:
+    """The values of all coordinates, of one or of several, whose numbers may be the rows of an array."""
+    return list(values) if isinstance(values, (tuple, list)) or (isinstance(values, np.ndarray) and values.ndim > 1) else [values]
+
+
+def less(values: Sequence[Any], others: Sequence[Any]) -> list[Any]:
+    """The differences, without those that are 0 for every state."""
+    return [x if is_zero(y) else x - y for x, y in zip(values, others, strict=True)]

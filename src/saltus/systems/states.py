@@ -257,10 +257,13 @@ def within_window(system: System, points: np.ndarray, window: Window, shrunk: An
     if not system.model.contacts:
         return states
     bounds = np.asarray(window)
-    if inner is not system:  # the box around the window
-        rows: Any = inner.model
+    rows: Any = inner.model
+    if inner is not system and rows.is_bent:  # the box around the states
+        there = in_gaps(system, states).reshape(-1, len(window))
+        bounds = np.stack([there.min(axis=0), there.max(axis=0)], axis=1)
+    elif inner is not system:  # the box around the window
         centre = in_gaps(system, window.centre)
-        half = np.abs(np.kron(np.eye(2), np.array(rows.sums()[0], dtype=float))) @ window.half
+        half = np.abs(np.kron(np.eye(2), np.array(rows.gap_sums()[0], dtype=float))) @ window.half
         bounds = np.stack([centre - half, centre + half], axis=1)
     return from_gaps(system, _held(inner, in_gaps(system, states), bounds))
 

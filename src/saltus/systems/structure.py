@@ -25,9 +25,9 @@ import numpy as np
 
 from saltus.checks import check_number
 from saltus.errors import ParameterError, near, shown
-from saltus.systems.contact_model import Contact, ContactModel, Friction, Surface, is_zero
+from saltus.systems.contact_model import Contact, ContactModel, Friction, Surface
 from saltus.systems.impact_laws import Coefficients, NamedParts, RowNumbers, Vectors
-from saltus.systems.model import Count
+from saltus.systems.model import Count, is_zero
 from saltus.systems.record_files import ConstantNumbers, check_independent, check_matrices, matrices_in, read_array
 
 MODE = "mode_"  # begins the names of the amplitudes

@@ -6,6 +6,7 @@ name. Nodes are shared: equal expressions are one object, so that nothing is com
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from saltus.taylor.rules import FUNCTIONS
 POINTWISE = ("greater", "less", "greater_equal", "less_equal", "where", "maximum", "minimum")
 LEAVES = (
     *("number", "parameter", "time", "origin", "side", "free", "slide", "coordinate", "velocity", "acceleration", "record"),
-    *("form", "mode", "datum"),  # sums over modes, accelerations of modes, and coefficients of both (see `memory.py`)
+    *("form", "mode", "datum", "shift"),  # sums over modes, accelerations of modes, coefficients of both (`memory.py`), shifts
 )
 RECORD_WIDTH = 5  # coefficients of a record's piece: a cubic spline of velocity makes a quartic displacement
 
@@ -131,6 +132,8 @@ class Expr:
         raise TraceError("a traced quantity is a scalar: it cannot be unpacked or looped over")
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **kwargs: Any) -> Expr:
+        if _holds_expressions(inputs):
+            return NotImplemented  # type: ignore[no-any-return]
         name = UFUNCS.get(ufunc.__name__)
         if method != "__call__" or kwargs or name is None:
             raise TraceError(f"np.{ufunc.__name__} cannot be traced; {_what_is_allowed(*inputs)}")
@@ -197,8 +200,15 @@ def as_expr(value: Any) -> Expr:
     raise TraceError(f"a traced model cannot use {value!r} of type {type(value).__name__}; allowed are {ALLOWED}")
 
 
+def _holds_expressions(operands: Iterable[Any]) -> bool:
+    """Whether one of the operands may hold expressions itself, and so knows what the operation gives: one with derivatives."""
+    return any(getattr(type(x), "__array_priority__", 0) > Expr.__array_priority__ for x in operands)
+
+
 def combine(op: str, *operands: Any) -> Expr:
     """The node `op(operands)`, simplified where a literal 0 or 1, or literals alone, allow it."""
+    if _holds_expressions(operands):
+        return NotImplemented  # type: ignore[no-any-return]
     args = tuple(as_expr(a) for a in operands)
     values = [a.value if a.op == "number" else None for a in args]
     if all(v is not None for v in values):
@@ -223,6 +233,8 @@ def combine(op: str, *operands: Any) -> Expr:
 
 def power(base: Any, exponent: Any) -> Expr:
     """base ** exponent: products for small whole exponents, a recurrence for constant ones, exp(exponent log(base)) else."""
+    if _holds_expressions((base, exponent)):
+        return NotImplemented  # type: ignore[no-any-return]
     base, exponent = as_expr(base), as_expr(exponent)
     if exponent.op == "number":
         whole = int(exponent.value) if np.isfinite(exponent.value) else 0

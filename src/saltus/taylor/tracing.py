@@ -328,7 +328,7 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
     result.ground_speeds = [combine("add", w, 0.0) for w in speeds]
     places = [model.coordinates.index(part.coordinate) for part in parts]
     result.friction_coordinates = tuple(p if k < len(frictions) else -1 - p for k, p in enumerate(places))
-    result.mass = [combine("add", entry, 0.0) for row in mass_rows(model, q) for entry in row]
+    result.mass = [combine("add", entry, 0.0) for row in mass_rows(model, q, t, load) for entry in row]
     result.restitution = [combine("add", entry, 0.0) for row in twin.impact.restitution_matrix(model) for entry in row]
     result.positions = [combine("add", contact.position, 0.0) for contact in contacts]
     afters = [ask(model, "after_impact", contact.name, q, v) for contact in contacts if result.first_order]

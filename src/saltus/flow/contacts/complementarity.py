@@ -349,3 +349,10 @@ def worst_violation(motion, chosen, acts, after):
         elif way != FrictionImpact.NOT:
             worst = max(worst, -slip_sign(motion, k) * (after[c] - ground_speed(motion, k)))
     return worst
+
+
+@lean_jit
+def tell_instant(motion):
+    """Tell the numbers of events, through `env`, the instant, which are functions of it where walls move."""
+    first = motion.parameters.size - motion.local - 2
+    motion.parameters[first], motion.parameters[first + 1] = motion.time, motion.origin

@@ -35,7 +35,7 @@ def hold_frictions(motion):
     first = motion.parameters.size - motion.local
     for k in range(motion.frictions.shape[0]):
         slides = motion.frictions[k, FrictionColumn.SLIDES]
-        motion.parameters[first - motion.frictions.shape[0] + k] = 1.0 * slides if slides != 2 else 0.0
+        motion.parameters[first - 2 - motion.frictions.shape[0] + k] = 1.0 * slides if slides != 2 else 0.0
         if slides == 0:
             motion.parameters[first + motion.frictions[k, FrictionColumn.COORDINATE]] = 0.0
 

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from saltus.flow.contacts.complementarity import acting, complementary, invert, push
+from saltus.flow.contacts.complementarity import acting, complementary, invert, push, tell_instant
 from saltus.flow.contacts.layout import FINISHED, MOST_FROZEN_IMPACTS, VANISHED, ContactColumn, contact_position, restitution
 from saltus.flow.kernel.layout import CHATTER_SPEED, EXACT, SLOW, Mode
 from saltus.flow.kernel.steps import column_step, leaps, step_size
@@ -69,6 +69,7 @@ def fill_contact_matrices(motion):
     """Fill `NUMBERS`, `INVERSE`, `COUPLING`, `GAPS` and `RATES` of `solver` at the present state; False if the mass matrix is
     singular."""
     count, signs = motion.contacts.shape[0], motion.signs
+    tell_instant(motion)
     motion.matrices(motion.env, motion.piece, motion.state, motion.solver_numbers)
     regular = invert(motion.solver_numbers, motion.local, motion.block, motion.inverse)
     for i in range(count):

@@ -259,7 +259,7 @@ def rubbed_accumulation(motion, t, near, i, limit):
     """
     u, k = motion.rates[i], rubs_along(motion, i) - 1
     coordinate, place = motion.contacts[i, ContactColumn.COORDINATE], motion.parameters.size - motion.local
-    place += k - motion.frictions.shape[0]
+    place += k - 2 - motion.frictions.shape[0]
     motion.parameters[place] = motion.signs[i]
     expand(motion, t, 1.0, 0)
     rising = -motion.signs[i] * motion.acceleration_series[coordinate, 0]

@@ -37,6 +37,7 @@ def contacts_impact(lane, hit):
     numbers, rates, speed = array[0], solver.rates, np.inf
     numbers.dof, numbers.own, numbers.local, numbers.piece = own, own, lane.sizes.local, lane.piece
     numbers.first_order = lane.sizes.first_order
+    numbers.time, numbers.origin = lane.new_time, lane.origin
     parts = LaneImpactParts(state_arrays(numbers, state), env, env[0], functions_of(lane), contacts, solver)
     motion = by_reference(MotionMemory(numbers, parts))
     for row in range(2 * own):  # velocities follow the positions in both memories

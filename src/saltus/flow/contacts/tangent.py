@@ -15,9 +15,17 @@ import math
 
 import numpy as np
 
-from saltus.flow.contacts.complementarity import acting, fill_rubbing, invert, is_pressed, push
+from saltus.flow.contacts.complementarity import acting, fill_rubbing, invert, is_pressed, push, tell_instant
 from saltus.flow.contacts.impacts import frozen_accumulation, jump_place
-from saltus.flow.contacts.layout import APART, RELATIVE_STEP, TIED, ContactColumn, ImpactDetail, copy_all, restitution
+from saltus.flow.contacts.layout import (
+    APART,
+    RELATIVE_STEP,
+    TIED,
+    ContactColumn,
+    ImpactDetail,
+    copy_all,
+    restitution,
+)
 from saltus.flow.kernel.layout import EventCode
 from saltus.flow.kernel.steps import columns_at_event, expand
 from saltus.taylor import jit, lean_jit
@@ -48,6 +56,7 @@ def clear_shifts(motion):
 @lean_jit
 def fill_slopes(motion):
     """The derivatives of mass matrix, E and positions along each column."""
+    tell_instant(motion)
     motion.matrix_slopes(motion.env, motion.piece, motion.state, motion.slopes)
 
 
@@ -301,7 +310,9 @@ def fall_back(motion, t, closed, j):
             gained = motion.velocity_series if a >= own - motion.first_order else motion.acceleration_series
             lost[a] += sign * gained[own * (1 + j) + a, 0]
             u[a] = math.copysign(1.0, sign) * motion.velocities[a]
+        motion.shifts[j] = math.copysign(1.0, sign)
         fill_slopes(motion)
+        motion.shifts[j] = 0.0
         for a in range(local):
             for b in range(local):
                 for c in range(local):

@@ -19,7 +19,7 @@ from saltus.flow.contacts import kernel as contacts_kernel
 from saltus.flow.contacts import layout as contact_layout
 from saltus.flow.contacts.one_free import OneFree, equations_of_one_free
 from saltus.flow.kernel import event_derivatives, layout, loop, memory, roots, steps
-from saltus.flow.kernel.memory import ContactsFunctions, OneContactFunctions
+from saltus.flow.kernel.memory import INSTANT, ContactsFunctions, OneContactFunctions, behind_parameters
 from saltus.flow.one_contact import impacts, kernel
 from saltus.systems import System, numbers
 from saltus.taylor import (
@@ -100,8 +100,7 @@ class CompiledStructure:
         fill_constants, fill_geometry = _load_fillers()
         fill_constants(self.tables[0], parameters, constants)
         if self.several:
-            modes = np.append(np.zeros(self.frictions), np.ones(self.sizes.local))
-            env = (np.append(parameters, modes), constants, *records)
+            env = (np.append(parameters, behind_parameters(self.frictions, self.sizes.local)), constants, *records)
             series, matrices, slopes, tangent = self.functions
             return env, ContactsFunctions(series, matrices, np.array(self.signs, dtype=float), slopes, tangent)
         env = (parameters, constants, *records)
@@ -276,9 +275,9 @@ def _series(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
 
 
 def _free(trace: Trace) -> dict[str, tuple[str, int]]:
-    """The places behind the parameters that hold in which direction each friction slides, and whether each coordinate is free."""
-    first = len(trace.parameters)
-    return {"slide": ("parameters", first), "free": ("parameters", first + len(trace.friction_coordinates))}
+    """The places behind the parameters: in which direction each friction slides, and, behind an instant, what is free."""
+    first, count = len(trace.parameters), len(trace.friction_coordinates)
+    return {"slide": ("parameters", first), "free": ("parameters", first + count + len(INSTANT))}
 
 
 def _data(known: dict[Expr, int]) -> dict[str, tuple[str, int]]:
@@ -298,13 +297,13 @@ def _contact_series(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
 def _matrices(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
     """The numbers that events at contacts need (`Trace.contact_numbers`) at a state; with modes all but zeros."""
     filled = {("out", i): root for i, root in enumerate(trace.contact_numbers) if not (trace.modes and root is number(0.0))}
-    places = Places(("env", "piece", "state", "out"), ENV | HERE | {"velocity": ("state", len(trace.acceleration))})
+    places = Places(("env", "piece", "state", "out"), ENV | HERE | event_derivatives.places_at_event(trace))
     return _function("matrices", places, [Case(tape(list(filled.values()), known), list(filled))])
 
 
 def _matrix_slopes(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
     """The derivatives, along each column of the tangent, of the numbers that `matrices` fills; one column after the other."""
-    slopes, leaves = event_derivatives.number_slopes(trace), ENV | HERE | {"velocity": ("state", len(trace.acceleration))}
+    slopes, leaves = event_derivatives.number_slopes(trace), ENV | HERE | event_derivatives.places_at_event(trace)
     filled = {("out", i): root for i, root in enumerate(slopes) if not (trace.modes and root is number(0.0))}
     cases = [Case(tape(list(filled.values()), known), list(filled))] if filled else []
     return _function("matrix_slopes", Places(("env", "piece", "state", "out"), leaves), cases)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 from saltus.flow.kernel.layout import EventCode, ReleaseDetail, RestDetail
+from saltus.flow.kernel.memory import INSTANT
 from saltus.taylor import (
     Expr,
     Trace,
@@ -176,9 +177,22 @@ def time_left(trace: Trace) -> Expr:
     return -2.0 * flights / (1.0 - last_speed / speed)
 
 
+def places_at_event(trace: Trace) -> dict[str, tuple[str, int]]:
+    """The places of an event's instant, velocities and shifts."""
+    count, first = len(trace.acceleration), len(trace.parameters) + len(trace.friction_coordinates)
+    instant = {op: ("parameters", first + i) for i, op in enumerate(INSTANT)}
+    return instant | {"velocity": ("state", count), "shift": ("state", 2 * count)}
+
+
 def number_slopes(trace: Trace) -> list[Expr]:
-    """The derivatives, along each column, of the numbers that events at contacts need; one column after the other."""
-    return [trace.derivative_along(x, j) for j in range(trace.columns) for x in trace.contact_numbers]
+    """The derivatives, along each column, of the numbers that events at contacts need, at an instant that moves with its shift;
+    one column after the other."""
+    drifts = [trace.time_derivative(x) for x in trace.contact_numbers] if trace.columns else []
+    return [
+        trace.derivative_along(x, j) + drift * Expr("shift", (), j)
+        for j in range(trace.columns)
+        for x, drift in zip(trace.contact_numbers, drifts, strict=True)
+    ]
 
 
 def reaction_slopes(trace: Trace, reaction: Expr) -> list[Expr]:

@@ -88,6 +88,14 @@ def motion_record(order: int, sizes: tuple[int, ...]) -> tuple[np.ndarray, bytea
     return np.ndarray((1,), MOTION, memory), memory
 
 
+INSTANT = ("time", "origin")  # of an event, behind the parameters of a model with several contacts
+
+
+def behind_parameters(frictions: int, local: int) -> list[float]:
+    """What stands behind the parameters at the start: the slidings, an instant, and that all coordinates are free."""
+    return [0.0] * (frictions + len(INSTANT)) + [1.0] * local
+
+
 class MotionMemory(NamedTuple):
     """What `motion` is the address of."""
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from saltus.flow.lanes.inputs import Inputs
 from saltus.flow.lanes.options import EnsembleOptions, Sample
 from saltus.flow.lanes.threads import Ends, Jobs
 from saltus.flow.motion.events import Stop
+from saltus.flow.motion.sensitivities import state_slopes
 from saltus.flow.motion.simulate import simulate
 from saltus.systems import System, arguments_of
 from saltus.taylor import FREQUENCY
@@ -167,9 +167,12 @@ class EnsembleResult:
         rates, shifts = ends.rates[:, :own], ends.rates[:, own:]
         if (inner := self.system.in_gap_coordinates) is not self.system:  # their derivatives to parameters are not asked for
             twin = self.inputs.with_numbers(inner)
-            out, into = (_twice(rows, len(derivatives)) for rows in (twin.model.from_gaps(), twin.model.sums()[0]))
-            derivatives = out @ derivatives @ into
-            bent = twin.model.own(self.time, [*rates.T] if own > 1 else rates[:, 0], twin.load, 2)
+            model, load, begin = twin.model, twin.load, list(self.inputs.values.values())
+            start = [np.broadcast_to(x, len(derivatives)) for x in begin[: 2 * own]]
+            here = ends.states[:, :own].T, ends.states[:, rows : rows + own].T
+            into = state_slopes(model.gap_values, self.inputs.values["time"], (start[:own], start[own:]), load)
+            derivatives = state_slopes(model.own_values, self.time, here, load) @ derivatives @ into
+            bent = model.own_values(self.time, load, *([*x] if own > 1 else x[0] for x in (*here, rates.T)))[2]
             rates = np.column_stack(np.broadcast_arrays(self.time, *(bent if own > 1 else [bent])))[:, 1:]
         slope = np.concatenate([self.last[:, own:], rates], axis=1)
         limited = ends.rows["status"] == Status.LIMITED
@@ -183,13 +186,3 @@ class EnsembleResult:
             shift = np.where(moving, -span * length / (2.0 * np.pi), 0.0)  # of the end, -span / W
             derivatives[:, :, 2 * own + paths.index(FREQUENCY)] += np.where(moving[:, None], shift[:, None] * slope, 0.0)
         return derivatives
-
-
-def _twice(rows: list[list[Any]], size: int) -> np.ndarray:
-    """A matrix of numbers, or of arrays with a number for each trajectory, for coordinates and for velocities, (n, d, d)."""
-    own = len(rows)
-    found = np.zeros((size, 2 * own, 2 * own))
-    for i, row in enumerate(rows):
-        for j, entry in enumerate(row):
-            found[:, i, j] = found[:, own + i, own + j] = entry
-    return found

@@ -113,7 +113,8 @@ class MemoryPlan:
     def places(self) -> Parts:
         """The first slot of each part."""
         several, contacts = self.local if self.contacts or self.frictions else 0, self.contacts
-        sizes = [self.rows] * 8 + [self.parameters + self.frictions, several, contacts, several**2, contacts**2]
+        behind = self.frictions + (2 if several else 0)  # slidings, and an instant, of which lanes know without it
+        sizes = [self.rows] * 8 + [self.parameters + behind, several, contacts, several**2, contacts**2]
         sizes += [several, several, several**2, contacts, contacts]
         sizes += [self.constant_guards, self.constants + self.data, self.records * RECORD_WIDTH]
         sizes += [rows * SERIES_LENGTH for rows in (self.rows, self.rows, self.own, self.stops)]

@@ -198,13 +198,15 @@ class ContactEvents(MotionEvents):
     """The events of a motion with several contacts or frictions, in order of time."""
 
     def __init__(
-        self, length: float, labels: np.ndarray, values: np.ndarray, contacts: Sequence[str], frictions: Sequence[str]
+        self, length: float, labels: np.ndarray, values: np.ndarray, names: Sequence[Sequence[str]], places: np.ndarray
     ) -> None:
         super().__init__(length, labels, values)
-        self._contacts, self._frictions, self._own = contacts, frictions, (values.shape[1] - 1 - len(contacts)) // 2
+        self._contacts, self._frictions = names
+        self._own, self._places = (values.shape[1] - 1 - len(self._contacts)) // 2, places  # positions, if velocities need them
 
     def _only(self, chosen: Any) -> ContactEvents:
-        return ContactEvents(self._length, self._labels[chosen], self._values[chosen], self._contacts, self._frictions)
+        values, places = self._values[chosen], self._places[chosen] if self._places.size else self._places
+        return ContactEvents(self._length, self._labels[chosen], values, (self._contacts, self._frictions), places)
 
     def _event(self, index: int) -> ContactEvent:
         kind, bits = (int(x) for x in self._labels[index, 1:3])
@@ -219,8 +221,9 @@ class ContactEvents(MotionEvents):
         values = self._values.copy()
         for i in (1, 1 + self._own):  # before and after
             velocity = self._values[:, i : i + self._own].T
-            values[:, i : i + self._own] = system.from_gaps(self.times, velocity, velocity)[1].T
-        return ContactEvents(self._length, self._labels, values, self._contacts, self._frictions)
+            places = self._places.T if self._places.size else velocity
+            values[:, i : i + self._own] = system.from_gaps(self.times, places, velocity)[1].T
+        return ContactEvents(self._length, self._labels, values, (self._contacts, self._frictions), self._places)
 
     def _called(self, bits: int) -> str:
         chosen = [name for i, name in enumerate((*self._contacts, *self._frictions)) if bits >> i & 1]

@@ -45,7 +45,7 @@ class KernelState:
         self.array, self._memory = motion_record(taylor_order(request.tol), run.structure.sizes)  # one record MOTION
         mode, side, leave_by = self._at_contact(request, run)
         piece = int(breaks.searchsorted(request.time, side="right")) if breaks.size else 0
-        dense = int(request.dense or request.sample_times is not None)
+        dense = int(request.dense or request.sample_times is not None or _bends(request.system))
         where = (float(at.local), int(at.first), mode, side, piece, leave_by, dense)
         AT_START.pack_into(self._memory, 0, *where, int(at.last), float(at.end), float(at.length), float(request.tol))
 
@@ -179,6 +179,11 @@ class RecorderSettings:
 MOST = RecorderSettings()
 
 
+def _bends(system: System) -> bool:
+    """Whether velocities of the system that was given depend on positions, which events do not have, but steps do."""
+    return getattr(system.model, "is_bent", False)
+
+
 FIELDS = ("start", "length", "side", "series")
 
 
@@ -203,9 +208,11 @@ class Recorder:
     def __init__(self, request: MotionRequest, run: Program, order: int) -> None:
         self._system, self._times, self._columns = request.system, request.sample_times, run.structure.sizes.columns
         self._own, self._several = run.structure.sizes.own, run.structure.several
+        self._begin, self._drops = request.start[: self._own], not request.dense and request.sample_times is None
+        self._bends = _bends(request.system)
         self._wide = request.dense and request.sample_times is None and request.dense_tangent
         self._rows = self._own * (1 + self._columns if self._wide else 1), order + 2
-        self._keeps_steps = request.dense or request.sample_times is not None
+        self._keeps_steps = self._bends or not self._drops
         # The numbers of an event before its shifts:
         self._width = 1 + 2 * self._own + len(run.structure.signs) if self._several else 3
         self.total = 0  # events so far
@@ -213,6 +220,8 @@ class Recorder:
         self._length = float(request.clock.length)
         self._pieces: list[DenseOutput] = []
         self._events: list[tuple[np.ndarray, ...]] = []
+        self._places: list[np.ndarray] = []  # of the events, if the equations are in coordinates that bend
+        self._last: DenseOutput | None = None
         self._samples: list[tuple[np.ndarray, ...]] = []
         self._next = 0  # index of the first sample time that is still to come
         periods = request.clock.last - request.clock.first if request.clock.length else request.clock.end - request.clock.local
@@ -234,12 +243,23 @@ class Recorder:
     def take(self, numbers: Any) -> None:
         """Take what the buffers hold."""
         steps, events = numbers.recorded_steps, numbers.recorded_events
+        labels, values = self.events.event_labels[:events], self.events.event_values[:events]
         if steps:
-            labels, spans, series = [a[:steps] for a in self.steps]
+            kinds, spans, series = [a[:steps] for a in self.steps]
             series = series.copy() if 2 * steps < len(self.steps.step_series) else series
-            self._add(DenseOutput(labels[:, 0] * self._length + spans[:, 0], spans[:, 1], labels[:, 1], series))
-        self._events.append((self.events.event_labels[:events], self.events.event_values[:events]))
+            self._last = DenseOutput(kinds[:, 0] * self._length + spans[:, 0], spans[:, 1], kinds[:, 1], series)
+            if not self._drops:
+                self._add(self._last)
+        if self._bends:
+            self._places.append(self._positions(labels[:, 0] * self._length + values[:, 0]))
+        self._events.append((labels, values))
         self.total += events
+
+    def _positions(self, times: np.ndarray) -> np.ndarray:
+        """The own coordinates at events of the last steps, (events, coordinates)."""
+        if self._last is None:
+            return np.tile(self._begin, (times.size, 1))
+        return self._last.states(times)[0][: self._own].T
 
     def _add(self, piece: DenseOutput) -> None:
         if self._times is None:
@@ -286,7 +306,8 @@ class Recorder:
         if self._several:
             contacts, *others = _parts(self._system)
             names = [part.name for part in contacts], [part.name for parts in others for part in parts]
-            return ContactEvents(self._length, labels, values, *names)
+            places = joined(self._places) if self._bends else np.empty(0)
+            return ContactEvents(self._length, labels, values, names, places)
         return MotionEvents(self._length, labels, values)
 
     def event_shifts(self) -> np.ndarray:

@@ -28,7 +28,7 @@ from saltus.flow.kernel.compiled import (
     structure_functions,
 )
 from saltus.flow.kernel.layout import EventCode, Geometry, Mode, Status
-from saltus.flow.kernel.memory import ADVANCE, ADVANCE_CONTACTS, MOTION, SIZES
+from saltus.flow.kernel.memory import ADVANCE, ADVANCE_CONTACTS, MOTION, SIZES, behind_parameters
 from saltus.flow.motion.events import EventKind, Stop
 from saltus.flow.motion.simulate import refusal
 from saltus.systems import Pulse, System, children, substitute
@@ -159,7 +159,7 @@ class PortableMotion:
             "sizes": dict(zip(SIZES, map(int, structure.sizes), strict=True)),
             "constant_count": structure.constant_count + len(self.run.data),
             "data": self.run.data.tolist(),
-            "modes": [0.0] * structure.frictions + [1.0] * (structure.sizes.local if trace.several else 0),
+            "modes": behind_parameters(structure.frictions, structure.sizes.local) if trace.several else [],
             "signs": list(trace.signs),
             "contact_coordinates": list(trace.contact_coordinates),
             "friction_coordinates": list(trace.friction_coordinates),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -237,7 +237,7 @@ def derivatives_of(request: MotionRequest, run: Program | None, progress: Progre
         start = request.given.from_gaps(request.time, *np.split(request.start, 2))
         own = OwnColumns(request.given, paths, request.time, [x[:, None] for x in start])
         at_end, event_times = own.later(np.array([motion.time]), seen, at_end[None])[0], own.of_start(event_times)
-        rates = own.rates(motion.time, rates)
+        rates = own.rates(motion.time, motion.position, rates)
     columns = at_end + np.outer(rates, shift) if shift.any() else at_end
     return Sensitivities(
         motion=seen,
@@ -268,45 +268,57 @@ class OwnColumns:
 
     def of_start(self, columns: np.ndarray) -> np.ndarray:
         """Columns (..., 2 n + parameters) along the own state at the start and along parameters at this fixed state."""
-        rows, _ = self._model.sums()
-        n = len(rows)
-        into, first = np.kron(np.eye(2), np.array(rows, dtype=float)), columns[..., : 2 * n]
-        moved = first @ self._by_numbers("in_gaps", self.time, *self.start)[0]
+        model, load, n = self._model, self.system.load, len(self.start[0])
+        into, first = state_slopes(model.gap_values, self.time, self.start, load)[0], columns[..., : 2 * n]
+        moved = first @ self._by_numbers("gap_values", self.time, *self.start)[0]
         return np.concatenate([first @ into, columns[..., 2 * n :] + moved], axis=-1)
 
     def later(self, times: np.ndarray, motion: Motion, columns: np.ndarray) -> np.ndarray:
         """Columns (m, 2 n, 2 n + parameters) at times (m,) of a motion of the system."""
         if self._model is self.system.model:
             return columns
-        out = np.kron(np.eye(2), np.array(self._model.from_gaps(), dtype=float))
-        found = out @ self.of_start(columns)
         position, velocity, _ = motion._states(times) if motion.dense else (*_end_of(motion), None)
-        found[..., len(out) :] += self._by_numbers("own", times, *self.system.to_gaps(times, position, velocity))
+        inner = self.system.to_gaps(times, position, velocity)
+        out = state_slopes(self._model.own_values, times, inner, self.system.load)
+        found = out @ self.of_start(columns)
+        found[..., out.shape[-1] :] += self._by_numbers("own_values", times, *inner)
         return np.asarray(found)
 
-    def rates(self, time: float, rates: np.ndarray) -> np.ndarray:
+    def rates(self, time: float, position: Any, rates: np.ndarray) -> np.ndarray:
         """The velocity and acceleration of the own coordinates at a time, (2 n,)."""
-        velocity, acceleration = np.split(rates, 2)
-        load, (v, a) = self.system.load, ([*x] if len(x) > 1 else x[0] for x in (velocity, acceleration))
-        return np.concatenate([np.atleast_1d(self._model.own(time, x, load, order)) for order, x in ((1, v), (2, a))])
+        v, a = ([*x] if len(x) > 1 else x[0] for x in np.split(rates, 2))
+        return np.concatenate([np.atleast_1d(x) for x in self._model.own_values(time, self.system.load, position, v, a)[1:]])
 
     @property
     def _model(self) -> Any:
         return self.system.in_gap_coordinates.model
 
     def _by_numbers(self, method: str, times: Any, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """The derivatives of `own` or `in_gaps` to the parameters, (m, 2 n, parameters), from their values at complex numbers."""
+        """The derivatives of `own_values` or `in_gaps` to the parameters, (m, 2 n, parameters), at complex numbers."""
         step, found = 1e-100, np.zeros((position.shape[1], 2 * len(position), len(self.paths)))
         for j, path in enumerate(self.paths):
             chosen = {path: 1j * step}
             twin = substitute(self.system.in_gap_coordinates, lambda at, x, by=chosen: x + by[at] if at in by else x)  # type: ignore[misc]
-            for order, values in enumerate((position, velocity)):
-                given = [*values] if len(values) > 1 else values[0]
-                changed = getattr(twin.model, method)(times, given, twin.load, order)
-                each = changed if isinstance(changed, tuple) else (changed,)
-                for i, value in enumerate(each):
-                    found[:, order * len(values) + i, j] = np.imag(value) / step
+            given = ([*values] if len(values) > 1 else values[0] for values in (position, velocity))
+            changed = getattr(twin.model, method)(times, twin.load, *given)
+            each = [x for part in changed for x in (part if isinstance(part, tuple) else (part,))]
+            for i, value in enumerate(each):
+                found[:, i, j] = np.imag(value) / step
         return found
+
+
+def state_slopes(lead: Any, times: Any, states: Sequence[Any], load: Any) -> np.ndarray:
+    """The derivatives, at complex numbers, of the states that `lead` makes, `own_values` or `gap_values`, to the states that it
+    is given: coordinates and velocities of m motions, (n, m) each; (m, 2 n, 2 n)."""
+    state, step, n = np.array([*states[0], *states[1]], dtype=complex), 1e-100, len(states[0])
+    found = np.empty((state.shape[1], 2 * n, 2 * n))
+    for j in range(2 * n):
+        beside = state.copy()
+        beside[j] += 1j * step
+        changed = lead(times, load, *(tuple(half) if n > 1 else half[0] for half in np.split(beside, 2)))
+        values = [x for part in changed for x in (part if isinstance(part, tuple) else (part,))]
+        found[:, :, j] = np.stack([np.imag(x) / step * np.ones(len(found)) for x in values], axis=1)
+    return found
 
 
 def _end_of(motion: Motion) -> tuple[np.ndarray, np.ndarray]:

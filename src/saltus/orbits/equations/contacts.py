@@ -34,7 +34,7 @@ from saltus.orbits.branches.symmetry import full_point
 from saltus.orbits.equations.contract import MotionToRead, OrbitEquations, OrbitEvaluation, Solution
 from saltus.orbits.equations.event_sequence import STAYS, read_signature
 from saltus.orbits.signature import TOLERANCES, ModeChange, Signature
-from saltus.systems import System, arguments_of, held_values, image_of
+from saltus.systems import System, arguments_of, held_values, image_of, mass_rows
 from saltus.taylor import FREQUENCY
 
 AFTER_IMPACT = 2  # power of the time with which the gap grows after an impact with e = 0; after a release it is `AFTER_RELEASE`
@@ -77,9 +77,10 @@ class ContactsEquations(OrbitEquations):
 
     @classmethod
     def read(cls, base: OrbitEquations, motion: MotionToRead) -> tuple[OrbitEquations, np.ndarray] | None:
-        """None with frictions or with accumulations of impacts, for which there are no equations from event to event."""
-        known = base.system.contact_model if isinstance(base, cls) else None
-        if known is None or known.frictions or known.surfaces:
+        """None with frictions, with accumulations of impacts, or with walls that move the mass matrix, for which there are no
+        equations from event to event."""
+        known: Any = base.system.contact_model if isinstance(base, cls) else None
+        if known is None or known.frictions or known.surfaces or _has_moving_mass(known):
             return None
         if motion.twice.limit is not None or len(motion.twice.events.of(EventKind.HELD)):
             return None
@@ -314,3 +315,10 @@ class ContactsEquations(OrbitEquations):
 def no_event(closed: int) -> np.ndarray:
     """The plan of one segment without an event at its end."""
     return np.array([[closed, -1, -1, closed, 0, -1]], dtype=np.int64)
+
+
+def _has_moving_mass(model: Any) -> bool:
+    """Whether the mass matrix depends on time, as a wall moves and M on what it moves."""
+    size = len(model.coordinates)
+    one, other = (mass_rows(model, x if size == 1 else tuple(x / (1 + i) for i in range(size))) for x in (0.13, 0.21))  # any
+    return getattr(model, "has_moving_walls", False) and bool(np.not_equal(one, other).any())
