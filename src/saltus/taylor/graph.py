@@ -202,7 +202,7 @@ def as_expr(value: Any) -> Expr:
 
 def _holds_expressions(operands: Iterable[Any]) -> bool:
     """Whether one of the operands may hold expressions itself, and so knows what the operation gives: one with derivatives."""
-    return any(getattr(type(x), "__array_priority__", 0) > Expr.__array_priority__ for x in operands)
+    return any(getattr(x, "__array_priority__", 0) > Expr.__array_priority__ for x in operands)
 
 
 def combine(op: str, *operands: Any) -> Expr:
