@@ -249,7 +249,7 @@ def sampled(motion):
     inner = motion.system.in_gap_coordinates
     if inner is not motion.system:
         rows = np.array(inner.model.gap_sums()[0])
-        shifts = [[np.broadcast_to(m, times.shape) for m in inner.model.shift(times, load, rate)] for rate in range(3)]
+        shifts = [[np.broadcast_to(m, times.shape) for m in inner.model.walls_at(times, load, rate)] for rate in range(3)]
         found = [np.linalg.solve(rows, z - np.array(m)) for z, m in zip(found, shifts, strict=True)]
     return times, (half[:, None] * WEIGHTS).ravel(), *found
 
