@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 from math import cos, hypot, pi, sin
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -335,3 +337,39 @@ def test_orbits_of_twice_the_period_end_where_a_change_of_their_parent_bears_the
     (last,) = (point for point in born.special if point.kind == "SW" and point.parameter < 0.27)
     assert abs(last.parameter - change.parameter) < last.evidence.bracket < 1e-4
     assert born.special[-1].orbit.period == 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ledge(saltus.ContactModel):
+    """A mass on a spring along a tilted ledge of a structure, with friction in their contact."""
+
+    coordinates: ClassVar[tuple[str, ...]] = ("z", "x", "y")
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+    contacts = (saltus.Contact(name="ledge", coordinate="y"),)
+    frictions = (saltus.Friction(name="rub", coordinate="x", kinetic=0.2, contact="ledge"),)
+
+    def mass_matrix(self, q):
+        along, across = 0.1 * cos(0.5), -0.1 * sin(0.5)
+        return [[1.1, along, across], [along, 0.1, 0.0], [across, 0.0, 0.1]]
+
+    def force(self, t, q, velocity, load):
+        spring = load.force(t) - q[0] - 0.05 * velocity[0]
+        return spring, -0.03 * sin(0.5) - 0.05 * q[1], -0.03 * cos(0.5)
+
+
+def test_a_branch_ends_by_name_where_sliding_stops_just_as_impacts_die_away():
+    load = saltus.Load(frequency=1.01, force=saltus.Harmonic(0.05))
+    system = saltus.System(model=Ledge(), load=load, impact=saltus.NewtonImpact(e=0.4))
+    branch = saltus.continue_orbit(saltus.find_orbit(system, z=0.0, x=0.0, y=0.0), "load.frequency", (1.009, 1.02))
+    (end,) = [end for end in branch.ends if end.reason is OrbitEnd.TURNS]
+    assert end.parameter == max(branch.parameters)
+
+    def slip(orbit):
+        (held,) = [event for event in orbit.motion().events if event.kind == "held"]
+        return held.velocity_after[1]
+
+    slips, apart = (np.array([f(orbit) for orbit in branch.orbits]) for f in (slip, lambda o: end.parameter - o.frequency))
+    assert np.abs(slips[np.argmin(apart)]) < 1e-4
+    far = apart > 1e-4  # before, it slides on until it stops at a reversal after the impacts, later the farther
+    assert (slips[far] < 0.0).all()
+    assert (np.diff(slips[far][np.argsort(apart[far])]) < 0.0).all()

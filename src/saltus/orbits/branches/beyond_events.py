@@ -17,7 +17,7 @@ import numpy as np
 
 from saltus.continuation import Bounds, Corrected, Course, CurveEnd, Cut, End, Evidence, TestFunction, Zero
 from saltus.errors import SaltusError
-from saltus.flow import EventCode
+from saltus.flow import EventCode, EventKind
 from saltus.orbits.branches.beyond_rest import as_the_motion_goes_on
 from saltus.orbits.branches.orbit_curve import FLIP, OrbitPoint
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint
@@ -140,7 +140,7 @@ def stalled_at(point: OrbitPoint, step: float, points: Sequence[OrbitPoint] = ()
     here = parent_of(point) or point
     _, beside = next(_beside(here, events_at(here).sequence), (None, None))
     if beside is None:
-        return None
+        return End(OrbitEnd.TURNS, point.parameter) if _turns_at_an_impact(point) else None
     test, width = same_events(point), step * np.abs(np.array(point.curve.scales))
     there, value = -max(events_of(beside).distance, TINY), test.value(point)
     known = [(value, point.parameters)]
@@ -153,6 +153,22 @@ def stalled_at(point: OrbitPoint, step: float, points: Sequence[OrbitPoint] = ()
         width = np.maximum(width, SETTINGS.doubt * np.abs(place - near / (far - near) * (other - place) - point.parameters))
     evidence = Evidence(point.residual, tuple(map(float, width)), value, there, value)
     return change_at(SpecialPoint(SpecialKind.SW, point, evidence), point)
+
+
+def _turns_at_an_impact(point: OrbitPoint) -> bool:
+    """Whether a friction in a contact stops sliding just at an impact, up to a small speed."""
+    system = point.orbit.system
+    inner = system.in_gap_coordinates.model
+    pressed = [friction for friction in inner.frictions if friction.contact is not None]
+    if not pressed:
+        return False
+    motion = point.orbit.motion()
+    for event in motion.events.of(EventKind.IMPACT):
+        _, speed = system.to_gaps(event.time, motion.at(event.time)[0], event.velocity_after)
+        slips = [abs(speed[inner.coordinates.index(each.coordinate)] - float(each.ground_speed)) for each in pressed]
+        if min(slips) < SETTINGS.probes[0]:
+            return True
+    return False
 
 
 def _stands(point: OrbitPoint) -> bool:

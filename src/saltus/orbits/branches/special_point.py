@@ -94,6 +94,10 @@ class OrbitEnd(EndReason):
     NOT_CONTINUOUS = (
         "at {parameter:.10g} an event appears or is lost at which the motion is not continuous: neighbours end up {detail} apart"
     )
+    TURNS = (
+        "at {parameter:.10g} the sliding in a contact stops just at an impact: beyond, it turns round before this impact, where "
+        "impacts die away before ever earlier ones, and the multipliers jump at each of them"
+    )
     NO_SECTION = "at {parameter:.10g} an event comes to the phase at which the state is given, and no other phase would do"
     STICKS = "from {parameter:.10g} on the mass sticks for good; it may then rest anywhere near that place"
     NO_MOTION = "the motion cannot be followed {detail} the grazing"
