@@ -19,7 +19,11 @@ FOLDERS = (ROOT / "tests", ROOT / "reproduction" / "tests")
 # Left out here, as they take minutes: quick versions of them are tested in files of their own, and `make release-check` judges
 # their claims at full size.
 SPECTRA = ("fig09", "fig10", "fig11", "fig12", "fig13", "fig14", "fig15", "quasi")
-ELSEWHERE = (*SPECTRA, "smoothing")  # the last is computed, judged and drawn in reproduction/tests/test_smoothing_study.py
+ELSEWHERE = (
+    *SPECTRA,
+    "smoothing",
+    "chain",
+)  # the last two are computed, judged and drawn in test_smoothing_study.py and test_chain.py
 # Fewer values along an axis: reproduction/tests/test_both_layers.py has the loads on both sides of the one that its claim names.
 COARSE = {"both_layers": {"size": 5}}
 # Those of sections 2 to 5 and of the appendix; from 29 on they are our own (docs/errata.md).

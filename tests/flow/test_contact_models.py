@@ -238,6 +238,7 @@ def test_cells_that_move_alike_move_as_one_for_any_number_of_them(cells):
 def test_equations_of_many_coordinates_move_alike_without_the_passes_of_llvm(monkeypatch):
     """The order of operations stays, and so the motion up to rounding; what is compiled so depends on the coordinates."""
     assert [is_long(trace(chain(cells))) for cells in (3, 4, 5)] == [False, False, True]
+    assert [is_long(trace(chain(cells), sensitivities=())) for cells in (2, 3)] == [False, True]
     theta, made, codes = state(2), [], set()
     for most in (LIMITS.optimised, 0):
         monkeypatch.setattr("saltus.taylor.graph.LIMITS", replace(LIMITS, optimised=most))

@@ -371,8 +371,10 @@ def ask(model: Any, method: str, *arguments: Any) -> Any:
 
 
 def is_long(traced: Any) -> bool:
-    """Whether the equations of many coordinates have so many loops that they are compiled without LLVM's passes."""
-    return bool(traced.dof > LIMITS.optimised) and loop_count(_expanded(traced)) > traced.dof
+    """Whether the equations of many coordinates, or their derivatives, have so many loops that LLVM's passes are left out."""
+    if traced.dof <= LIMITS.optimised and not traced.columns:
+        return False
+    return loop_count(_expanded(traced)) > (traced.dof if traced.dof > LIMITS.optimised else LIMITS.operations)
 
 
 def _expanded(traced: Any) -> list[Expr]:

@@ -20,7 +20,7 @@ from saltus_paper.report.data_tables import DataTables, data_tables
 from saltus_paper.report.embedded_pictures import EmbeddedPicture, embedded
 from saltus_paper.report.exact_features import chart_features, diagram_features
 
-BEYOND = "B"  # the section of subjects that the paper does not treat; it has a chapter of its own
+BEYOND = {"both_layers": "B", "chain": "C"}  # sections of subjects that the paper does not treat; each has a chapter of its own
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
