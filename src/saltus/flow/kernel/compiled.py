@@ -361,22 +361,29 @@ class Program:
 def program(system: System, limits: tuple[str, ...] | None = None, sensitivities: tuple[str, ...] | None = None) -> Program:
     """A system ready to run, by default with the margins that end a motion in any case, and with a tangent if asked for. Its
     structure is traced and compiled unless it is known; its numbers are filled in at the first time."""
-    limits, key = limits_of(system, ()) if limits is None else limits, structure_key(system)
-    run: Program = system._remembered((limits, sensitivities), lambda: _made(system, (key, limits, sensitivities)))
+    structure_key(system)  # what a system remembers is forgotten where values that its classes read have changed
+    return known_program(system, limits_of(system, ()) if limits is None else limits, sensitivities)
+
+
+def known_program(system: System, limits: tuple[str, ...], sensitivities: tuple[str, ...] | None) -> Program:
+    """The same, for a caller who has asked for the structure's key already."""
+    run: Program = system._remembered((limits, sensitivities), lambda: _made(system, limits, sensitivities))
     if not run.structure.several:
         return run
     return replace(run, env=(run.env[0].copy(), *run.env[1:]))  # the kernel writes which coordinates are free
 
 
-def _made(system: System, asked: tuple[Any, ...]) -> Program:
+def _made(system: System, limits: tuple[str, ...], sensitivities: tuple[str, ...] | None) -> Program:
+    asked = (structure_key(system), limits, sensitivities)
     if asked not in _structures:
         traced = trace(system, *asked[1:])
         _structures[asked] = traced, load_structure(traced)
     traced, structure = _structures[asked]
     parameters = np.array([value for _, value in numbers(system)])
-    data = system.in_gap_coordinates.model.records.array if traced.modes is not None else ()
-    env, model = structure.prepare(parameters, record_table(system, traced.records), data)
-    return Program(traced, structure, env, model, tuple(traced.margins))
+    model: Any = system.in_gap_coordinates.model
+    data = model.records.array if traced.modes is not None else ()
+    made = structure.prepare(parameters, record_table(system, traced.records), data)
+    return Program(traced, structure, *made, tuple(traced.margins))
 
 
 _structures: dict[Any, tuple[Trace, CompiledStructure]] = {}

@@ -46,8 +46,8 @@ class KernelState:
         mode, side, leave_by = self._at_contact(request, run)
         piece = int(breaks.searchsorted(request.time, side="right")) if breaks.size else 0
         dense = int(request.dense or request.sample_times is not None or _bends(request.system))
-        where = (float(at.local), int(at.first), mode, side, piece, leave_by, dense)
-        AT_START.pack_into(self._memory, 0, *where, int(at.last), float(at.end), float(at.length), float(request.tol))
+        where = (at.local, at.first, mode, side, piece, leave_by, dense)
+        AT_START.pack_into(self._memory, 0, *where, at.last, at.end, at.length, request.tol)
 
     @property
     def numbers(self) -> Any:
@@ -73,14 +73,6 @@ class KernelState:
 
     def _kernel(self) -> Callable[..., int]:
         return load_kernel()
-
-    def position(self, numbers: Any) -> np.ndarray:
-        """The model's own coordinates."""
-        return self.state[: numbers.own]
-
-    def velocity(self, numbers: Any) -> np.ndarray:
-        """Their velocities."""
-        return self.state[numbers.dof : numbers.dof + numbers.own]
 
     def side(self, numbers: Any) -> int:
         """+1 or -1, and 0 at rest."""
@@ -217,7 +209,7 @@ class Recorder:
         self._width = 1 + 2 * self._own + len(run.structure.signs) if self._several else 3
         self.total = 0  # events so far
         self._kept = 0  # steps so far
-        self._length = float(request.clock.length)
+        self._length = request.clock.length
         self._pieces: list[DenseOutput] = []
         self._events: list[tuple[np.ndarray, ...]] = []
         self._places: list[np.ndarray] = []  # of the events, if the equations are in coordinates that bend

@@ -11,7 +11,7 @@ import numpy as np
 
 from saltus.checks import LIMITS, Numbers, check_memory, check_number, check_size, notice_degrees
 from saltus.errors import MotionError, ParameterError
-from saltus.flow.kernel.compiled import Program, limits_of, program, taylor_order
+from saltus.flow.kernel.compiled import Program, known_program, limits_of, taylor_order
 from saltus.flow.kernel.layout import Mode, Status
 from saltus.flow.motion.events import Stop
 from saltus.flow.motion.kernel_state import MOST, ContactState, KernelState, Recorder, time_of
@@ -128,7 +128,10 @@ class MotionRequest:
         for i, name in angles:
             notice_degrees(name, start.item(i))
         self.time, self.tol = float(time), float(tol)
-        self.start = start if self.system is system else np.concatenate(system.to_gaps(self.time, *np.split(start, 2)))
+        self.start = start
+        if self.system is not system:
+            structure_key(self.system)
+            self.start = np.concatenate(system.to_gaps(self.time, *np.split(start, 2)))
         self.sample_times = None if times is None else _sample_times(times, self.time)
         self.periods, self.side, self.sensitivities = periods, side, sensitivities
         self.dense, self.dense_tangent = dense, dense_tangent
@@ -147,7 +150,8 @@ def _plan(system: System, asked: tuple[Any, ...]) -> MotionPlan:
     check_number("time", time)
     if side not in (None, 1, -1):
         raise ParameterError(f"side must be +1 or -1, got {side!r}", "side")
-    when = clock(float(time), system.load.period, periods, duration)
+    first, local, last_one, end, length = clock(float(time), system.load.period, periods, duration)
+    when = Clock(int(first), float(local), int(last_one), float(end), float(length))
     if dense and whole:
         _check_dense(when, periods, duration)
     made = MotionPlan(asked, limits, when, _angles(system))
@@ -285,7 +289,7 @@ class Followed(NamedTuple):
 
 def follow(request: MotionRequest, progress: Progress, run: Program | None = None) -> Followed:
     """Follow the motion of a request, with its tangent if the request asks for one; `run` is its program, if that is known."""
-    run = run or program(request.system, request.limits, request.sensitivities)
+    run = run or known_program(request.system, request.limits, request.sensitivities)
     now = (ContactState if run.structure.several else KernelState)(request, run)
     recorder = Recorder(request, run, taylor_order(request.tol))
     status, numbers = _advance(request, run, now, recorder, progress)
@@ -346,10 +350,12 @@ def _why_so_many(system: System, recorder: Recorder) -> str:
 
 def _refuse(system: System, status: int, now: KernelState) -> None:
     """Raise an error, with a sentence, for a status that is no regular end of a motion."""
-    time, velocity = time_of(now.numbers), now.velocity(now.numbers)
+    numbers = now.numbers
+    time, own = time_of(numbers), numbers.own
+    position, velocity = now.state[:own], now.state[numbers.dof : numbers.dof + own]
     sentence = refusal(system, status, f"{time:.9g}", f"{velocity[0]:.6g}")
     if status in (Status.NOT_UNIQUE, Status.NO_IMPACT):
-        sentence = _paradox(system, time, (tuple(now.position(now.numbers)), tuple(velocity))) or sentence
+        sentence = _paradox(system, time, (tuple(position), tuple(velocity))) or sentence
     if sentence is not None:
         raise MotionError(sentence)
 
@@ -413,21 +419,21 @@ def refusal(system: System, status: int, time: str, velocity: str) -> str | None
 def _collect(request: MotionRequest, now: KernelState, status: int, numbers: Any, recorder: Recorder) -> Motion:
     """The motion from the kernel's last state and its records."""
     events, start = recorder.all_events(), request.time
-    time, position, velocity, side = time_of(numbers), now.position(numbers), now.velocity(numbers), now.side(numbers)
-    one, mode = position.size == 1, numbers.mode
+    time, mode, own, state = time_of(numbers), numbers.mode, numbers.own, now.state.tolist()
+    position, velocity, side = state[:own], state[numbers.dof : numbers.dof + own], now.side(numbers)
     stop, limit = (Stop.REST if mode == Mode.REST else Stop.HORIZON), None
     if status == Status.LIMITED:
         stop, limit = Stop.LIMIT, request.limits[events.details[-1]]
     if status == Status.STALLED:
         stop, limit = Stop.SINGULAR, request.system.model.singularity  # `_refuse` lets no other motion stall
-    samples = None if request.sample_times is None else recorder.samples(time, position, velocity, side)
+    samples = None if request.sample_times is None else recorder.samples(time, np.array(position), np.array(velocity), side)
     return Motion.of_fields(
         system=request.system,
         tol=request.tol,
         start=start,
         time=time,
-        position=position.item() if one else tuple(position.tolist()),
-        velocity=velocity.item() if one else tuple(velocity.tolist()),
+        position=position[0] if own == 1 else tuple(position),
+        velocity=velocity[0] if own == 1 else tuple(velocity),
         side=side,
         stop=stop,
         limit=limit,
