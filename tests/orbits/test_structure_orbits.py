@@ -102,3 +102,22 @@ def test_orbits_of_many_coordinates_are_approached_without_derivatives(monkeypat
         assert point.orbit.defect < 1e-12
         beside = point.place + 1e-3
         assert point.curve.residual(beside) == pytest.approx(point.curve.evaluate(beside, True).residual, abs=1e-12)
+
+
+def test_a_sweep_has_the_extrema_of_each_coordinate() -> None:
+    far = saltus.Contact(name="far", coordinate=1, position=50.0, sign=-1)
+    pair = saltus.Structure(mass=np.eye(2), damping=0.05 * STIFFNESS, stiffness=STIFFNESS, contacts=[far], forces={"f": 1})
+    system = saltus.System(model=pair, load=saltus.Load(frequency=0.5, f=saltus.Harmonic(FORCE)))
+    sweep = saltus.frequency_sweep(system, [0.5, 0.55], x1=0.0, mode_1=0.0)
+    held = abs(np.linalg.solve(pair.displacements(np.eye(2)), np.linalg.solve(
+        STIFFNESS * (1.0 + 0.05j * 0.5) - 0.25 * np.eye(2), [0.0, FORCE]
+    )))  # fmt: skip
+    assert held == pytest.approx([amplitude(0.5), held[1]], rel=1e-12)
+    assert held[1] < 0.7 * held[0]
+    for name, expected in zip(pair.coordinates, held, strict=True):
+        for way in ("up", "down"):
+            at = sweep.sel(direction=way, value=0.5)
+            assert float(at[f"largest_{name}"]) == pytest.approx(expected, rel=1e-6)
+            assert float(at[f"smallest_{name}"]) == pytest.approx(-expected, rel=1e-6)
+    assert float(sweep.amplitude[0, 0]) == pytest.approx(amplitude(0.5), rel=1e-6)
+    assert "all coordinates" in sweep.amplitude.attrs["long_name"]

@@ -23,6 +23,7 @@ from saltus.plots.conventions import (
     new_figure,
     parameter_name,
     parameter_symbol,
+    peak,
     state_symbol,
     symbol,
     unit_in_brackets,
@@ -321,12 +322,11 @@ def draw_sweep(
                 "mutation_scale": 7,
             }
             ax.annotate("", (place, high), (place, low), arrowprops=arrow, zorder=3)
-    name = symbol(dataset.attrs["coordinate"])
     ax.set_xlim(values[0], values[-1])
     ax.set_ylim(bottom=0.0 if quantity == "amplitude" else None)
     ax.set_xlabel(parameter_name(dataset.attrs["path"]))
     ax.set_ylabel(
-        rf"$\max_\tau|{name}|${unit_in_brackets(dataset['amplitude'])}"
+        f"${peak(dataset.attrs['coordinate'])}${unit_in_brackets(dataset['amplitude'])}"
         if quantity == "amplitude"
         else dataset[quantity].attrs["long_name"]
     )

@@ -107,21 +107,25 @@ class SweepRequest:
             threads=1 if len(states) == 1 else None,
         )
 
-    def numbers_of(self, value: float, row: Recurrence) -> list[float]:
-        """The functions of the motion on which one value was left: one period of it or, if it has none, `max_period`."""
-        if not self.functions:
-            return []
-        names, last = self.system.model.coordinates, row.last[0]
-        start = dict(zip(names, last[: len(names)].tolist(), strict=True))
-        speeds, periods = tuple(last[len(names) :].tolist()), int(row.period[0]) or self.max_period
-        velocity = speeds[0] if len(names) == 1 else speeds
-        system = self.system.with_({self.path: float(value)})
-        motion = simulate(system, **start, velocity=velocity, periods=periods, tol=self.tol)
-        numbers = {name: np.asarray(function(motion)) for name, function in self.functions.items()}
-        for name, number in numbers.items():
+    def numbers_of(self, value: float, row: Recurrence) -> dict[str, float]:
+        """The extrema of each coordinate, and the functions, of the motion on which one value was left: of one period of it or,
+        if it has none, of `max_period` forcing periods, but of no more than each value is kept for."""
+        names, extrema, given = self.system.model.coordinates, [[row.lowest[0], row.highest[0]]], dict(self.functions or {})
+        if given or len(names) > 1:
+            system, periods = (
+                self.system.with_({self.path: float(value)}),
+                int(row.period[0]) or min(self.max_period, self.periods),
+            )
+            motion = simulate(system, **arguments_of(system, row.last[0]), periods=periods, tol=self.tol)
+            extrema = motion.extrema.tolist() if len(names) > 1 else extrema
+        found = {f"largest_{name}": high for name, (_, high) in zip(names, extrema, strict=True)}
+        found |= {f"smallest_{name}": low for name, (low, _) in zip(names, extrema, strict=True)}
+        for name, function in given.items():
+            number = np.asarray(function(motion))
             if number.ndim or number.dtype.kind not in "biuf":
                 raise ParameterError(f"functions must return a number, and {name!r} returned {shown(number)}", "functions")
-        return [float(number) for number in numbers.values()]
+            found[str(name)] = float(number)
+        return found
 
 
 def _check(progress: object = None, **arguments: Any) -> None:
@@ -180,18 +184,18 @@ def frequency_sweep(
         The error that one step of the integration may make.
     functions
         Quantities of one's own by name: numbers of the motion on which each value was left, which begins at phase 0 and takes one
-        period or, where it does not repeat itself, `max_period` forcing periods.
+        period or, where it does not repeat itself, `max_period` forcing periods, but no more than `periods`.
     progress
         Called with the fraction done and what is being done.
 
     Returns
     -------
     xarray.Dataset
-        A Dataset, whose values increase. Over (direction, value): `amplitude` (largest absolute value), `largest_...` and
-        `smallest_...` of the first coordinate in the motion's period; `impact_count`, `period` (0: it does not repeat itself),
-        `outcome`, the state at phase 0, and the `functions`. Over (value): `hysteresis`. Over (jump): its direction, the values
-        that enclose it and the amplitudes there. At values that were not reached, as a margin ended the motion before, there is
-        nan.
+        A Dataset, whose values increase. Over (direction, value): `amplitude` (largest absolute value of all coordinates),
+        `largest_...` and `smallest_...` of each coordinate in the motion's period; `impact_count`, `period` (0: it does not
+        repeat itself), `outcome`, the state at phase 0, and the `functions`. Over (value): `hysteresis`. Over (jump): its
+        direction, the values that enclose it and the amplitudes there. At values that were not reached, as a margin ended the
+        motion before, there is nan.
 
     Raises
     ------
@@ -236,7 +240,7 @@ class _OneWay:
     values: np.ndarray
     start: np.ndarray
     rows: list[Recurrence]
-    numbers: list[list[float]]  # of the functions
+    numbers: list[dict[str, float]]  # the extrema of the coordinates, and the functions
 
     @property
     def amplitude(self) -> np.ndarray:
@@ -354,10 +358,9 @@ def _dataset(asked: SweepRequest, runs: tuple[_OneWay, _OneWay], jumps: list[tup
     model, count = asked.system.model, asked.grid.size
     name, names = model.coordinates[0], model.coordinates
     unit = model.unit_of(name)
+    of = f"abs({name})" if len(names) == 1 else "abs of all coordinates"
     columns: dict[str, tuple[Callable[[Recurrence], Any], str, str]] = {
-        "amplitude": (amplitude_of, unit, f"max abs({name}) in a period"),
-        f"largest_{name}": (lambda row: row.highest[0], unit, f"largest {name} in a period"),
-        f"smallest_{name}": (lambda row: row.lowest[0], unit, f"smallest {name} in a period"),
+        "amplitude": (amplitude_of, unit, f"max {of} in a period"),
         "impact_count": (lambda row: row.impact_count[0], "1", "impacts in a period"),
         "period": (lambda row: row.period[0], "1", "forcing periods after which it repeats itself; 0 where it does not"),
         "periods": (lambda row: row.periods[0], "1", "forcing periods that it was followed"),
@@ -366,11 +369,15 @@ def _dataset(asked: SweepRequest, runs: tuple[_OneWay, _OneWay], jumps: list[tup
         columns[state] = (partial(_state_of, i), model.unit_of(names[i % len(names)]), f"{state} at phase 0")
     table = {key: np.full((2, count), np.nan) for key in columns}
     outcome = np.full((2, count), "", dtype="<U8")
-    own = {str(name): np.full((2, count), np.nan) for name in asked.functions or {}}
+    texts = {
+        f"{most}_{each}": {"units": model.unit_of(each), "long_name": f"{most} {each} in a period"}
+        for most in ("largest", "smallest")
+        for each in names
+    }
+    own = {key: np.full((2, count), np.nan) for key in (*texts, *map(str, asked.functions or {}))}
     for way, run in enumerate(runs):
-        places = np.searchsorted(asked.grid, run.values)
-        for i, values in enumerate(own.values()):
-            values[way, places] = [numbers[i] for numbers in run.numbers]
+        for key, values in own.items():
+            values[way, np.searchsorted(asked.grid, run.values)] = [numbers[key] for numbers in run.numbers]
     for run, values, words in zip(runs, zip(*table.values(), strict=True), outcome, strict=True):
         places = np.searchsorted(asked.grid, run.values)
         words[places] = [Ending(int(row.outcome[0])).name.lower() for row in run.rows]
@@ -381,7 +388,7 @@ def _dataset(asked: SweepRequest, runs: tuple[_OneWay, _OneWay], jumps: list[tup
         {key: (over, table[key], {"units": units, "long_name": text}) for key, (_, units, text) in columns.items()},
         {"direction": list(DIRECTIONS), "value": ("value", asked.grid, {"units": "1", "long_name": asked.path})},
     )
-    data = data.assign({name: (over, values, {"units": "1", "long_name": name}) for name, values in own.items()})
+    data = data.assign({key: (over, found, texts.get(key, {"units": "1", "long_name": key})) for key, found in own.items()})
     data["outcome"] = (over, outcome, {"long_name": "rest, periodic, or moving without repeating itself"})
     up, down = table["amplitude"]
     apart = np.abs(up - down) > SETTINGS.hysteresis * np.nanmax(table["amplitude"], initial=0.0)
@@ -393,7 +400,7 @@ def _dataset(asked: SweepRequest, runs: tuple[_OneWay, _OneWay], jumps: list[tup
     start = {f"start_{each}": float(x) for each, x in zip(names, asked.start, strict=False)}
     numbers: dict[str, Any] = {
         "path": asked.path,
-        "coordinate": name,
+        "coordinate": " ".join(names),
         "periods": asked.periods,
         "stop_early": str(asked.stop_early),
         **start,
