@@ -285,7 +285,8 @@ def checked_impacts(drawn: Drawn, motion, rows: np.ndarray) -> Impacts:
         if layout.moving:
             wall[:, 0] = motion.system.load.ground(event.time), motion.system.load.ground.velocity(event.time)
         near, falls = layout.contacts @ q[:, 0] - wall[0] - drawn.given["p"] < 1e-9, layout.contacts @ before - wall[1]
-        touch = near & ((np.abs(falls) < 1e-13 * size) | [f"c{i}" in event.contact.split("+") for i in range(count)])
+        struck = [event.contact == "both" or f"c{i}" in event.contact.split("+") for i in range(count)]
+        touch = near & ((np.abs(falls) < 1e-13 * size) | struck)
         kept = layout.contacts @ after - wall[1] + drawn.e * falls
         two_phases = layout.law is saltus.PoissonImpact and max(layout.pressed, default=-1) >= 0
         if not two_phases:

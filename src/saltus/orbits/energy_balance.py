@@ -154,7 +154,7 @@ def course_of(of: Followed, periods: int | None) -> SampledPart:
     dense = motion.dense
     first = np.clip(dense.start, begin, end)
     length_left = np.clip(np.minimum(dense.start + dense.length, end) - first, 0.0, None)
-    used = length_left > 0.0
+    used = first + 0.5 * (1.0 + NODES[0]) * length_left > first  # else a node could not be told from the end of the step
     middle, half = (first + 0.5 * length_left)[used], 0.5 * length_left[used]
     time = (middle[:, None] + half[:, None] * NODES).reshape(-1)
     position, velocity, side = dense.states(time)
