@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 from scipy.optimize import brentq, fsolve, minimize_scalar
 
 import saltus
@@ -121,3 +122,59 @@ def test_a_sweep_has_the_extrema_of_each_coordinate() -> None:
             assert float(at[f"smallest_{name}"]) == pytest.approx(-expected, rel=1e-6)
     assert float(sweep.amplitude[0, 0]) == pytest.approx(amplitude(0.5), rel=1e-6)
     assert "all coordinates" in sweep.amplitude.attrs["long_name"]
+
+
+CHAIN = 2.0 * np.eye(10) - np.eye(10, k=1) - np.eye(10, k=-1)
+GAP, LOSS, PUSH = 0.2, 0.6, 0.05
+
+
+def impacting_chain(frequency: float) -> saltus.System:
+    """Ten masses in a row, of which the last one has a hard stop."""
+    stop = saltus.Contact(name="stop", coordinate=9, position=GAP, sign=-1)
+    chain = saltus.Structure(mass=np.eye(10), damping=0.05 * CHAIN, stiffness=CHAIN, contacts=[stop], forces={"f": 0})
+    load = saltus.Load(frequency=frequency, f=saltus.Harmonic(PUSH))
+    return saltus.System(model=chain, load=load, impact=saltus.NewtonImpact(e=LOSS))
+
+
+def monodromy(orbit: saltus.PeriodicOrbit) -> np.ndarray:
+    """The derivatives of the displacements and velocities over a period, by matrix exponentials between the impacts and
+
+        S = R + (f+ - R f-) n' / (n' f-)
+
+    at each of them, with the rates f of the state before and after, the reflection R and the direction n of the stop.
+    """
+    start, chain, frequency = orbit.start(), orbit.system.model, orbit.frequency
+    between = np.block([[np.zeros((10, 10)), np.eye(10)], [-CHAIN, -0.05 * CHAIN]])
+    pushed = np.zeros((22, 22))  # and sin and cos of the load
+    pushed[:20, :20], pushed[10, 20], pushed[20, 21], pushed[21, 20] = between, PUSH, frequency, -frequency
+    names, time = chain.coordinates, start.get("time", 0.0)
+    place, rates = (chain.displacements(x) for x in ([start[name] for name in names], np.array(start["velocity"])))
+    state = np.concatenate([place, rates, [np.sin(frequency * time), np.cos(frequency * time)]])
+    end, found, reflection = time + orbit.duration, np.eye(20), np.diag([1.0] * 19 + [-LOSS])
+    for impact in [*(event.time for event in orbit.motion().events), end]:
+        state, found, time = expm((impact - time) * pushed) @ state, expm((impact - time) * between) @ found, impact
+        if impact < end:
+            assert state[9] == pytest.approx(GAP, abs=1e-9)
+            before = (pushed @ state)[:20]
+            state[:20] = reflection @ state[:20]
+            jump = np.outer((pushed @ state)[:20] - reflection @ before, np.eye(20)[9]) / before[9]
+            found = (reflection + jump) @ found
+    return found
+
+
+@pytest.mark.thorough
+def test_special_points_of_ten_masses_are_those_of_their_monodromy_by_matrix_exponentials() -> None:
+    system = impacting_chain(0.282)
+    orbit = saltus.find_orbit(system, **system.model.start())
+    branch = saltus.continue_orbit(orbit, "load.frequency", (0.281, 0.2828))
+    apart = {
+        "LP": lambda values: np.abs(values - 1.0).min(),
+        "NS": lambda values: np.abs(np.abs(values[np.abs(values.imag) > 1e-3]) - 1.0).min(),
+    }
+    assert {"LP", "NS", "GR"} <= {str(point.kind) for point in branch.special}
+    for point in branch.special:
+        if str(point.kind) in apart:
+            assert apart[str(point.kind)](np.linalg.eigvals(monodromy(point.orbit))) < 1e-6
+    for point in branch.points[::10]:
+        expected = np.linalg.eigvals(monodromy(point.orbit))
+        assert abs(point.orbit.multipliers[0]) == pytest.approx(np.abs(expected).max(), rel=1e-6)
