@@ -223,6 +223,17 @@ def test_a_block_with_two_corners_moves_as_with_one_until_the_other_one_hits_and
     np.testing.assert_allclose([motion.y, motion.tilt, *motion.velocity[1:]], [0.4, 0.0, 0.0, 0.0], rtol=0, atol=1e-13)
 
 
+def test_a_block_with_two_corners_that_turns_on_its_side_ends_there_by_name():
+    """There the tilt does not follow from the heights of the corners any more; free fall with a constant spin before it."""
+    system = System(model=TwoCorners(), impact=NewtonImpact(e=0.5))
+    motion = simulate(system, x=0.0, y=50.0, tilt=0.3, velocity=(0.1, 0.0, 0.7), duration=9.0)
+    assert (str(motion.stop), motion.limit) == ("limit", "lean turns")
+    assert motion.time == pytest.approx((math.pi / 2 - 0.3) / 0.7, abs=1e-7)
+    many = simulate_many(system, x=0.0, y=50.0, tilt=[0.3, -0.3], velocity=(0.1, 0.0, 0.7), duration=2.0)
+    assert many.tilt.values[1] == pytest.approx(1.1, abs=1e-12)
+    np.testing.assert_allclose(many.time, [motion.time, 2.0], rtol=0, atol=1e-7)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Bob(ContactModel):
     """A pendulum over a floor, in the coordinate of its angle: its height is 1 - cos(angle)."""
@@ -318,6 +329,19 @@ def test_a_body_that_slides_in_a_curved_valley_swings_as_its_own_equation_has_it
     assert np.ptp(0.5 * (v**2).sum(axis=0) + q[1]) < 1e-13
 
 
+def test_a_body_in_a_valley_that_shakes_swings_at_half_the_frequency():
+    """Parametrically, held on the ground: of its four multipliers two are 0, and two have the product exp(-c T)."""
+    load = Load(frequency=1.0, ground=saltus.Harmonic(amplitude=0.85))
+    system = System(model=Bead(), load=load, impact=NewtonImpact(e=0.5))
+    motion = simulate(system, x=0.3, y=2.0, velocity=(0.0, 0.0), periods=400)
+    orbit = saltus.find_orbit(system, x=motion.x, y=motion.y, velocity=motion.velocity)
+    assert (orbit.period, orbit.stable) == (2, True)
+    sizes = np.sort(abs(orbit.multipliers))
+    np.testing.assert_allclose(sizes, [0.0, 0.0, *2 * [math.exp(-0.1 * 2.0 * math.pi)]], rtol=0, atol=1e-9)
+    verdict = saltus.classify(system, x=0.3, y=2.0)
+    assert (str(verdict.kind), verdict.period) == ("periodic", 2)
+
+
 # --- walls that move, and mass matrices that depend on the coordinate they move ------------------------------------------------
 
 
@@ -403,6 +427,11 @@ REFUSED = {
     "Made.depth fails: TraceError: np.arcsin of coordinates": {"depth": lambda self, q: np.arcsin(q[2])},
     "use NumPy's functions, not math's": {"depth": lambda self, q: math.cos(q[2])},
     "Made.depth must return a number": {"depth": lambda self, q: np.sqrt(-1.0 - q[2] ** 2)},
+    "Made.lean_inverse must give the coordinate at which lean has a value": {
+        "contacts": (*FallingBlock.contacts, Contact(name="right", coordinate={"y": 1.0, "depth": -1.0, "lean": 1.0})),
+        "lean": lambda self, q: -np.sin(q[2]),
+        "lean_inverse": lambda self, value: -np.arctan(value),
+    },
     "has a part named own_values": {"own_values": 1.0},
     "'right' keeps y_minus_depth_minus_tip, and needs a coordinate": {
         "contacts": (*FallingBlock.contacts, Contact(name="right", coordinate={"y": 1.0, "depth": -1.0, "tip": -1.0})),

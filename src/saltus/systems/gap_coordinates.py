@@ -20,7 +20,7 @@ from saltus.systems.load import Load
 from saltus.systems.model import Jet, as_given, derivatives_along, each_of, is_function, is_zero, less, reads_of, weighted
 
 Part = Contact | Surface | Friction
-INVERSE = "_inverse"  # behind the name of a model's function, the name of its inverse
+INVERSE, TURNS = "_inverse", " turns"  # behind the name of a model's function, its inverse, and the margin that ends this
 CLOSED_BELOW = 1e-13  # A contact is closed, up to rounding, if both its gap and its speed are smaller than this.
 
 
@@ -93,6 +93,11 @@ class InGapCoordinates(ContactModel):
     def mirror(self, load: Any) -> Any:
         """That of the model as it was given, unless its mirror images swap coordinates or functions of them are in sums."""
         return None if self.is_bent or self.own_class.images is not ContactModel.images else super().mirror(load)
+
+    @property
+    def stops(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Those of the model as it was given, and where functions that stand for coordinates turn."""
+        return (*super().stops, *(name + TURNS for _, name in self.gap_places.stands))
 
     def gap_sums(self) -> tuple[list[list[Any]], list[dict[str, Any]], list[dict[str, Any]]]:
         """A as rows, and for each row the coefficients of load channels in m(t) and of functions in h(q)."""
@@ -222,9 +227,12 @@ class InGapCoordinates(ContactModel):
         return super().kinetic_energy(t, q, v, side, load)
 
     def margins(self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Any) -> dict[str, Any]:
-        """Those of the model as it was given."""
+        """Those of the model as it was given, and slopes of what stands for coordinates, whose inverses end where it turns."""
         q, v, a = self.own_values(t, load, theta, velocity, acceleration)
-        return super().margins(t, q, v, a, side, load)
+        found = dict(super().margins(t, q, v, a, side, load))
+        for place, name in self.gap_places.stands:
+            found[name + TURNS] = self._function(name, [Jet(x, float(i == place)) for i, x in enumerate(each_of(q))]).first
+        return found
 
 
 def in_gap_coordinates(model: Any) -> Any:
@@ -240,9 +248,7 @@ def in_gap_coordinates(model: Any) -> Any:
         return model
     kind: Any = type(model)
     if taken := {name for name in (*vars(InGapCoordinates), "own_class") if name not in dir(ContactModel)} & {*dir(kind)}:
-        raise ParameterError(
-            f"{kind.__name__} has a part named {min(taken)}, which saltus gives to models with sums: rename it", "model"
-        )
+        raise ParameterError(f"{kind.__name__} has a part named {min(taken)}, as its coordinates of gaps do: rename it", "model")
     made = object.__new__(_class_in(kind, places))  # its numbers have been checked
     for field in fields(model):
         object.__setattr__(made, field.name, getattr(model, field.name))
@@ -300,12 +306,7 @@ def _placed(model: Any, parts: Sequence[Part], reads: dict[str, tuple[int, ...]]
             left = [Fraction(terms.get(name, 0.0)) for name in columns]
             for place, row in reduced.items():
                 left = [a - left[place] * b for a, b in zip(left, row, strict=True)]
-            read = {
-                place
-                for name, share in zip(columns[len(names) :], left[len(names) :], strict=True)
-                if share
-                for place in reads[name]
-            }
+            read = {place for name in columns[len(names) :] if left[columns.index(name)] for place in reads[name]}
             free = [place for place in range(len(names)) if left[place] and place not in rows and place not in read]
             if not free or any(name in model.coordinates and name not in names for name in terms):
                 return _no_place(part, parts, reads)

@@ -13,10 +13,10 @@ import numpy as np
 
 from saltus.errors import ParameterError, SaltusError, shown
 from saltus.systems.contact_model import MOST_CONTACTS, MOST_FRICTIONS, Contact, ContactModel, Friction, Surface, sides_for
-from saltus.systems.gap_coordinates import InGapCoordinates, Part
+from saltus.systems.gap_coordinates import INVERSE, InGapCoordinates, Part
 from saltus.systems.impact_laws import ImpactLaw, check_paradox
 from saltus.systems.load import DeclaredLoad, Load
-from saltus.systems.model import Model, OneContactModel, check_one_contact, is_function
+from saltus.systems.model import SCALES, Jet, Model, OneContactModel, as_given, check_one_contact, is_function
 
 # The parts of the contracts of the two siblings: a class that defines one of them and is of neither has the wrong base.
 OWN_PARTS = {
@@ -348,6 +348,8 @@ def _check_sum(model: ContactModel, contact: Part) -> None:
             raise ParameterError(
                 f"{_named(contact)} {shown(name)}, none of {known}{reason if name in model.channels else no_function}", "model"
             )
+        if own and hasattr(model, name + INVERSE):
+            _check_inverse(model, name)
         if not (isinstance(factor, (int, float)) and math.isfinite(factor) and factor != 0.0):
             raise ParameterError(
                 f"{where} must have coefficients that are numbers other than 0, got {shown(factor)} of {name}", "model"
@@ -358,6 +360,17 @@ def _check_sum(model: ContactModel, contact: Part) -> None:
         raise ParameterError(
             f"{_named(contact)} a sum of coordinates, so {type(model).__name__} must define force, not acceleration", "model"
         )
+
+
+def _check_inverse(model: ContactModel, name: str) -> None:
+    """Refuse an inverse that is none, and one of a function that falls with its coordinate."""
+    for x in SCALES:
+        value = _asked(model, name, as_given([x] * len(model.coordinates)))
+        found = None if value is None else _asked(model, name + INVERSE, value)
+        again = None if found is None else _asked(model, name, as_given([Jet(found, 1.0)] * len(model.coordinates)))
+        if again is not None and (again.first < 0.0 or abs(again.value - value) > MODEL_ROUNDING):
+            what = f"{type(model).__name__}.{name}{INVERSE} must give the coordinate at which {name} has a value"
+            raise ParameterError(f"{what}, where {name} rises with it, and gives {found:g} for {float(value):g}", "model")
 
 
 def _named(part: Contact | Surface | Friction) -> str:

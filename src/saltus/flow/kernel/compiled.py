@@ -390,8 +390,8 @@ _structures: dict[Any, tuple[Trace, CompiledStructure]] = {}
 
 
 def limits_of(system: System, stop_at: Iterable[str]) -> tuple[str, ...]:
-    """The margins that end a motion: the model's own stops and those asked for."""
-    model, asked = system.model, check_names("stop_at", stop_at, "margins, such as ['kinematic_limit']")
+    """The margins that end a motion: the model's own stops, in coordinates of its gaps, and those asked for."""
+    model, asked = system.in_gap_coordinates.model, check_names("stop_at", stop_at, "margins, such as ['kinematic_limit']")
     own = system._remembered("limits", lambda: (*model.stops, *model.friction_limits))
     return tuple(dict.fromkeys((*own, *asked)))
 
