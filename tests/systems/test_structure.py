@@ -124,6 +124,19 @@ def test_a_structure_of_another_size_has_the_same_code(coupled: bool) -> None:
     assert code(4) == code(9)
 
 
+def test_the_series_of_derivatives_are_as_long_for_any_size() -> None:
+    from saltus.flow.kernel.compiled import structure_functions
+    from saltus.taylor.generated import llvm_text
+    from saltus.taylor.tracing import trace
+
+    def length(size: int) -> int:
+        model = saltus.Structure(**chain(size), contacts=[STOP], surfaces=[SOFT], forces={"drive": 0})
+        functions = structure_functions(trace(saltus.System(model=model, load=LOAD), sensitivities=("load.drive.amplitude",)))
+        return len(llvm_text([each for each in functions if each.name == "series"]))
+
+    assert length(24) < 1.01 * length(4)
+
+
 SOFT_WALL = saltus.Contact(name="wall", coordinate=0, position=-2.0)
 
 

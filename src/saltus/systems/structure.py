@@ -273,7 +273,8 @@ class Structure(ContactModel):
             if own.damped:
                 found[i] = found[i] - _sum(own.damping[i], v[:m])
             if len(q) < own.size:
-                found[i] = found[i] - theta.sum_over_modes(places.stiffness[i], places.local_damping[i] if own.damped else None)
+                rates = places.local_damping[i] if own.damped else None
+                found[i] = found[i] - theta.sum_over_modes(places.size, places.stiffness[i], rates)
             else:
                 found[i] = found[i] - _sum([record[places.stiffness[i]] for record in records], q[m:])
                 if own.damped:
@@ -290,11 +291,8 @@ class Structure(ContactModel):
             found[i] = found[i] - 0.5 * (1.0 + side) * pressed
         return found[0] if own.size == 1 else tuple(found)
 
-    def mode_equations(
-        self, t: Any, theta: Any, velocity: Any, load: Any
-    ) -> tuple[ModeRecord, bool, list[tuple[Any, int, float]]]:
-        """The places in a mode's record, whether D couples modes, and the modes' inputs, each with its coefficient's place and a
-        sign.
+    def mode_equations(self, t: Any, theta: Any, velocity: Any, load: Any) -> tuple[ModeRecord, bool, list[Any]]:
+        """The places in a mode's record, whether D couples modes, and their inputs, each with its coefficient's place and a sign.
 
         Parameters
         ----------

@@ -79,19 +79,20 @@ class WrittenFunction:
                 stack_of_cache_lines(function, CACHE_LINE)
             Series(Memory(builder, self.arithmetic, self.places, arguments), tape, rows).write_motion(tape.roots)
         else:
+            if any(node[0] == "form" for case in self.content for node in case.tape.nodes):
+                function.attributes.update(("noinline", "optnone"))  # many sums over modes, at events only, without LLVM's passes
             memory = Memory(builder, self.arithmetic.unfused(), self.places, arguments)
             results = [value for case in self.content for value in _write_case(memory, case)]
         self._return(builder, function, results)
 
-    def _return(self, builder: Any, function: Any, results: list[Any]) -> None:
+    def _return(self, builder: Any, function: Any, results: list[Any]) -> Any:
         """The end of the function, with its results."""
         assert len(results) == result_count(self.signature)
         if len(results) == 1:
-            builder.ret(results[0])
-            return
+            return builder.ret(results[0])
         for i, result in enumerate(results):
             builder.store(result, builder.gep(function.args[-1], [LONG(i)]))
-        builder.ret_void()
+        return builder.ret_void()
 
 
 def _write_case(memory: Memory, case: Case) -> list[Any]:

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from saltus.taylor.graph import RECORD_WIDTH, Expr, combine, number, ordered, substitute
+from saltus.taylor.graph import RECORD_WIDTH, Expr, combine, differentiate, number, ordered, substitute
 from saltus.taylor.load_tables import expand_record
 from saltus.taylor.rules import FUNCTIONS
-from saltus.taylor.vectors import DOUBLE, LONG, Arithmetic, Vec
+from saltus.taylor.vectors import DOUBLE, LONG, Arithmetic, Vec, loop
 
 Node = tuple[Any, ...]
 Constants = dict[Expr, int]
@@ -159,8 +159,26 @@ class Memory:
             for coefficient in coefficients[-2::-1]:
                 value = value * since + coefficient
             return value
+        if op == "form":
+            return self._sum_over_modes(index[0])
         name, first = self.leaves[op]
         return self.load((name, first + (index[0] if index else 0)))
+
+    def _sum_over_modes(self, form: ModeSum) -> Vec:
+        """A sum over modes at an instant."""
+        b, data, parts = self.builder, self.pointer(self.leaves["datum"]), list[tuple[Any, int]]()
+        for op, place in (("coordinate", form.amplitudes), ("velocity", form.rates)):
+            if place is not None:
+                name, first = self.leaves[op]
+                parts.append((self.pointer((name, first + form.first)), place))
+        after = list[Vec]()
+        with loop(b, 0, self.whole(data), [self.arithmetic.number(b, 0.0)], after) as (i, (total,)):
+            for state, place in parts:
+                datum = b.gep(data, [b.add(b.mul(i, LONG(form.record)), LONG(1 + place))])
+                factor, value = (Vec(b, self.load_from(p), self.arithmetic) for p in (datum, b.gep(state, [i])))
+                total = total + factor * value
+            after.append(total)
+        return after[0]
 
     def record_series(self, row: int) -> Any:
         """The Taylor coefficients of a record about the time."""
@@ -220,6 +238,7 @@ class ModeSum(NamedTuple):
     amplitudes: int
     rates: int | None  # None: the sum has none
     first: int  # the coordinate that is the first mode, of the motion or of a column of its tangent
+    record: int  # how many numbers the record of a mode has
 
 
 class ModeInput(NamedTuple):
@@ -248,6 +267,10 @@ class ModeBlock:
     forms: tuple[ModeSum, ...]
     inputs: tuple[ModeInput, ...]
     columns: tuple[tuple[ModeInput, ...], ...] = ()  # of each column of the tangent, besides the inputs that are local
+    # Of the acceleration of each local coordinate: its derivatives to what it depends on, which are constant. With them the local
+    # equations of all columns are one loop, where each column may have other terms.
+    slopes: tuple[tuple[tuple[Expr, Expr], ...], ...] = ()
+    pushes: tuple[tuple[Expr, ...], ...] = ()
 
     @property
     def dof(self) -> int:
@@ -262,12 +285,15 @@ class ModeBlock:
     @property
     def expressions(self) -> list[Expr]:
         """The inputs that are expressions, of the motion and then of the columns."""
-        return [each.of for each in (*self.inputs, *(x for column in self.columns for x in column)) if not each.local]
+        inputs = [each.of for each in (*self.inputs, *(x for column in self.columns for x in column)) if not each.local]
+        return [*inputs, *(slope for row in self.slopes for _, slope in row), *(x for column in self.pushes for x in column)]
 
     def written_out(self, place: int) -> Expr:
         """The acceleration at a place among all coordinates, those of the columns included, as an expression."""
         column, own = divmod(place, self.dof)
         base, i = column * self.dof, own - self.first
+        if i < 0:
+            return self._local_written_out(column, own)
         total = -(self._datum(i, self.square) * Expr("coordinate", (), place))
         if self.damping is not None and not self.coupled:
             total = total - self._datum(i, self.damping) * Expr("velocity", (), place)
@@ -280,12 +306,14 @@ class ModeBlock:
             total = total + each.sign * (self._datum(i, each.place) * of)
         return total
 
-    def sum_written_out(self, form: ModeSum) -> Expr:
-        """A sum over modes as an expression."""
-        total = number(0.0)
-        for place, op in ((form.amplitudes, "coordinate"), (form.rates, "velocity")):
-            for i in range(self.count if place is not None else 0):
-                total = total + self._datum(i, place or 0) * Expr(op, (), form.first + i)
+    def _local_written_out(self, column: int, i: int) -> Expr:
+        """The acceleration of a local coordinate of a column."""
+        pushed, base = self.pushes[column - 1], column * self.dof
+        total = pushed[i] if pushed else number(0.0)
+        for leaf, slope in self.slopes[i]:
+            form = leaf.op == "form"
+            shifted = leaf.value._replace(first=leaf.value.first + base) if form else leaf.value + base
+            total = total + slope * Expr(leaf.op, (), shifted)
         return total
 
     def _datum(self, mode: int, place: int) -> Expr:
@@ -310,9 +338,9 @@ class LocalPart(tuple[Expr, ...]):
     first: int  # the coordinate that is the first mode
     sums: list[ModeSum]
 
-    def sum_over_modes(self, amplitudes: int, rates: int | None = None) -> Expr:
-        """The sum over modes of coefficients, at places in their records, times amplitudes and rates."""
-        form = ModeSum(amplitudes, rates, self.first)
+    def sum_over_modes(self, record: int, amplitudes: int, rates: int | None = None) -> Expr:
+        """The sum over modes of coefficients, at places in their records of that length, times amplitudes and rates."""
+        form = ModeSum(amplitudes, rates, self.first, record)
         self.sums += [] if form in self.sums else [form]
         return Expr("form", (), form)
 
@@ -334,11 +362,23 @@ def mode_block(equations: Any, first: int, count: int, sums: Sequence[ModeSum]) 
 
 
 def without_modes(root: Expr, block: ModeBlock) -> Expr:
-    """An expression in which no sums over modes, and no accelerations of modes, are leaves."""
+    """An expression in which no accelerations of modes are leaves."""
     leaves: dict[Expr, Any] = {}
     for node in ordered([root]):
-        if node.op == "form":
-            leaves[node] = block.sum_written_out(node.value)
         if node.op == "mode":
             leaves[node] = block.written_out(node.value)
     return substitute(root, leaves) if leaves else root
+
+
+def leaves_of(root: Expr) -> list[Expr]:
+    """What of the state an expression depends on, in an order that is always the same."""
+    leaves = {node for node in ordered([root]) if node.op in ("coordinate", "velocity", "form")}
+    return sorted(leaves, key=lambda leaf: (leaf.op == "form", leaf.value, leaf.op))
+
+
+def local_slopes(accelerations: Sequence[Expr]) -> tuple[tuple[tuple[Expr, Expr], ...], ...]:
+    """The derivatives of local accelerations to all that they depend on, each with its leaf; they do not change in time, as the
+    equations of a structure are linear on each side of its surfaces."""
+    pairs = [[(leaf, differentiate(a, leaf)) for leaf in leaves_of(a)] for a in accelerations]
+    assert all(slope.degree == 0 for row in pairs for _, slope in row)
+    return tuple(tuple((leaf, slope) for leaf, slope in row if slope is not number(0.0)) for row in pairs)

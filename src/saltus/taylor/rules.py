@@ -12,15 +12,13 @@ table and compare each function's coefficients with 40 digits (tests/taylor/test
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from llvmlite import ir
 
-from saltus.taylor.vectors import CACHE_LINE, LONG, Coefficient, Vec, add, multiply, subtract
+from saltus.taylor.vectors import CACHE_LINE, LONG, Coefficient, Vec, add, loop, multiply, subtract
 
 if TYPE_CHECKING:
     from saltus.taylor.series import Series
@@ -198,7 +196,6 @@ class ModeLoops:
 
     def __init__(self, series: Any, rows: Any, inputs: list[Any]) -> None:
         self.series, self.rows, self.block, self.b = series, rows, rows.block, series.builder
-        self._carried: list[list[Vec]] = []
         self._inputs = dict(zip(self.block.expressions, inputs, strict=True))  # their rows
         memory = series.memory
         self._rows = [memory.pointer(place) for place in (rows.positions, rows.velocities, rows.accelerations)]
@@ -217,18 +214,23 @@ class ModeLoops:
         for which, kind in enumerate(("coordinate", "velocity")):
             if kind in leaves:
                 given = self.series.memory.pointer(leaves[kind])
-                with self._loop(0, 1 + self.rows.columns) as j:
-                    first = self.b.add(self.b.mul(j, self._dof), LONG(self.block.first))
-                    with self._loop(0, self._count) as i:
-                        row = self.b.add(first, i)
-                        self._store(self._place(which, row, LONG(0)), self._load(self.b.gep(given, [row])))
+                for begin, end, first in ((0, 1, self.block.first), (1, 1 + self.rows.columns, 0)):
+                    if begin < end:
+                        self._copy_columns(begin, end, first, which, given)
+
+    def _copy_columns(self, begin: int, end: int, first: int, which: int, given: Any) -> None:
+        with loop(self.b, begin, end) as j:
+            base = self.b.mul(j, self._dof)
+            with loop(self.b, first, self._dof) as i:
+                row = self.b.add(base, i)
+                self._store(self._place(which, row, LONG(0)), self._load(self.b.gep(given, [row])))
 
     def sums(self) -> None:
         """Compute all sums over modes at order 0; those of the next orders come with the modes' coefficients (`_columns`)."""
         forms, b = self.block.forms, self.b
         if not forms or not self.series.starts:
             return
-        with self._loop(0, 1 + self.rows.columns) as j:
+        with loop(self.b, 0, 1 + self.rows.columns) as j:
             base = b.add(b.mul(j, self._dof), LONG(self.block.first))
             for f in range(len(forms)):
                 parts = [(w, lambda i, at=place: self._datum(i, at), base) for g, w, place in self._parts if g == f]
@@ -254,7 +256,7 @@ class ModeLoops:
         self._columns(0, 1, [each for each in self.block.inputs if not each.local])
         begin, extra = 1, self.block.columns
         for column in range(1, 1 + self.rows.columns):
-            if extra and extra[column - 1]:
+            if extra and (extra[column - 1] or any(self._pushed(column))):
                 self._columns(begin, column, [])
                 self._columns(column, column + 1, list(extra[column - 1]))
                 begin = column + 1
@@ -268,7 +270,7 @@ class ModeLoops:
         values = [(each, series.now(self._inputs[each.of])) for each in more]
         given = [(each, self._lifted(value)) for each, value in values if value is not None]
         inverse = series._divided(self._one, 1)
-        with self._loop(begin, end) as j:
+        with loop(self.b, begin, end) as j:
             base = b.mul(j, self._dof)
             local = [
                 (
@@ -279,7 +281,10 @@ class ModeLoops:
                 if each.local
             ]
             first = b.add(base, LONG(block.first))
-            with self._loop(0, self._count, len(self._parts)) as (i, before):
+            if begin > 0:
+                self._advance_local(j, base, self._pushed(begin), begin < self.rows.kept)
+            after = list[Vec]()
+            with self._over_modes(len(self._parts), after) as (i, before):
                 row = b.add(first, i)
                 amplitude, rate = (self._load(self._place(which, row, self._order)) for which in (0, 1))
                 total = -(self._datum(i, block.square) * amplitude)
@@ -297,12 +302,37 @@ class ModeLoops:
                 for which in (1, 0):
                     self._store(self._place(which, row, following), new[which])
                 parts = zip(self._parts, before, strict=True)
-                self._carried.append([self._datum(i, place).fma(new[which], sofar) for (_, which, place), sofar in parts])
+                after += [self._datum(i, place).fma(new[which], sofar) for (_, which, place), sofar in parts]
             sums: dict[int, Vec] = {}
-            for (f, _, _), value in zip(self._parts, self._carried.pop(), strict=True):
+            for (f, _, _), value in zip(self._parts, after, strict=True):
                 sums[f] = sums[f] + value if f in sums else value
             for f, value in sums.items():
                 self._store(self._sum_of(j, f), value)
+
+    def _pushed(self, column: int) -> list[Vec | None]:
+        """The terms of a column's own in its local equations, at this order."""
+        values = [self.series.now(self._inputs[push]) for push in self.block.pushes[column - 1]]
+        return [None if value is None else self._lifted(value) for value in values]
+
+    def _advance_local(self, column: Any, base: Any, pushed: list[Vec | None], kept: bool) -> None:
+        """The local coordinates of a column."""
+        b, found, inverse = self.b, list[Vec](), self.series._divided(self._one, 1)
+        for i, row in enumerate(self.block.slopes):
+            total: Any = pushed[i] if pushed and pushed[i] is not None else self.series.memory.arithmetic.number(b, 0.0)
+            for leaf, slope in row:
+                if leaf.op == "form":
+                    value = self._load(self._sum_of(column, self.block.forms.index(leaf.value)))
+                else:
+                    value = self._load(self._place(int(leaf.op == "velocity"), b.add(base, LONG(leaf.value)), self._order))
+                total = self._lifted(self._inputs[slope].first[0]).fma(value, total)
+            found.append(total)
+        following = b.add(self._order, LONG(1))
+        for i, total in enumerate(found):
+            place = b.add(base, LONG(i))
+            if kept:
+                self._store(self._place(2, place, self._order), total)
+            self._store(self._place(0, place, following), self._load(self._place(1, place, self._order)) * inverse)
+            self._store(self._place(1, place, following), total * inverse)
 
     @property
     def _order(self) -> Any:
@@ -338,37 +368,16 @@ class ModeLoops:
 
     def _total(self, parts: list[tuple[int, Any, Any]]) -> Vec:
         """The sum over modes of coefficients, which are functions of the mode, times coordinates or rates, from a row on."""
-        with self._loop(0, self._count, 1) as (i, (total,)):
+        after = list[Vec]()
+        with self._over_modes(1, after) as (i, (total,)):
             for which, factor, base in parts:
                 total = factor(i).fma(self._load(self._place(which, self.b.add(base, i), self._order)), total)
-            self._carried.append([total])
-        return self._carried.pop()[0]
+            after.append(total)
+        return after[0]
 
-    @contextmanager
-    def _loop(self, begin: int, end: Any, carried: int | None = None) -> Iterator[Any]:
-        """A loop over whole numbers; so many numbers as `carried` says, which begin with 0, go through it: their next
-        values are put last into `_carried` by the code within."""
-        b, before = self.b, self.b.block
-        body = b.append_basic_block("modes")
-        b.branch(body)
-        b.position_at_end(body)
-        i = b.phi(LONG)
-        i.add_incoming(LONG(begin), before)
-        if carried is None:
-            yield i
-        else:
-            zero = self.series.memory.arithmetic.number(b, 0.0)
-            totals = [b.phi(zero.value.type) for _ in range(carried)]
-            for total in totals:
-                total.add_incoming(zero.value, before)
-            yield i, [Vec(b, total, self.series.memory.arithmetic) for total in totals]
-            for total, value in zip(totals, self._carried[-1], strict=True):
-                total.add_incoming(value.value, b.block)
-        following = b.add(i, LONG(1))
-        i.add_incoming(following, b.block)
-        after = b.append_basic_block("after")
-        b.cbranch(b.icmp_signed("<", following, LONG(end) if isinstance(end, int) else end), body, after)
-        b.position_at_end(after)
+    def _over_modes(self, carried: int, after: list[Vec]) -> Any:
+        """A loop over the modes, and through it so many numbers that begin with 0."""
+        return loop(self.b, 0, self._count, [self.series.memory.arithmetic.number(self.b, 0.0)] * carried, after)
 
 
 def needs_sums(op: str, degrees: list[int | None]) -> bool:
@@ -376,15 +385,6 @@ def needs_sums(op: str, degrees: list[int | None]) -> bool:
     if op == "mul":
         return degrees[0] is None and degrees[1] is None
     return op == "sqrt" or (op not in ("add", "sub") and degrees[-1 if op == "div" else 0] is None)
-
-
-def constant_table(builder: Any, numbers: list[float]) -> Any:
-    """LLVM's pointer to an array of constants in the compiled code."""
-    values = ir.Constant(ir.ArrayType(ir.DoubleType(), len(numbers)), numbers)
-    module = builder.module
-    table = ir.GlobalVariable(module, values.type, module.get_unique_name("numbers"))
-    table.linkage, table.global_constant, table.initializer = "internal", True, values
-    return table
 
 
 def mode_loops(series: Series, roots: list[int]) -> ModeLoops | None:

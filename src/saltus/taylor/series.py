@@ -25,11 +25,10 @@ from saltus.taylor.rules import (
     InnerLoop,
     Row,
     by_slope,
-    constant_table,
     mode_loops,
     needs_sums,
 )
-from saltus.taylor.vectors import CACHE_LINE, DOUBLE, LONG, Coefficient, Vec, add, dot, multiply, subtract
+from saltus.taylor.vectors import CACHE_LINE, DOUBLE, LONG, Coefficient, Vec, add, constant_table, dot, multiply, subtract
 
 
 @dataclass(frozen=True)

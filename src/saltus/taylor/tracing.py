@@ -35,7 +35,7 @@ from saltus.taylor.graph import (
     uses_velocity,
 )
 from saltus.taylor.load_tables import LoadTime
-from saltus.taylor.memory import ModeBlock, ModeInput, ModeRows, local_parts, mode_block, without_modes
+from saltus.taylor.memory import ModeBlock, ModeInput, ModeRows, leaves_of, local_parts, local_slopes, mode_block, without_modes
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -147,12 +147,16 @@ class Trace:
             if (path, order + 1) not in self.records:
                 self.records.append((path, order + 1))
         for j in range(self.columns):
-            following = self.dof * (1 + j)
-            self.acceleration += [
-                Expr("mode", (), following + i) if a.op == "mode" else self.derivative_along(a, j) for i, a in enumerate(own)
-            ]
+            places = range(self.dof * (1 + j), self.dof * (2 + j))
+            written = [] if self.modes is not None else [self.derivative_along(a, j) for a in own]
+            self.acceleration += written or [Expr("mode", (), place) for place in places]
         if self.modes is not None:
-            self.modes = replace(self.modes, columns=tuple(self._inputs_of_modes(j) for j in range(self.columns)))
+            local, empty = own[: self.local], list[Expr]()
+            columns = tuple(self._inputs_of_modes(j) for j in range(self.columns))
+            pushes = [
+                [self.partial_derivative(a, j) for a in (local if j >= 2 * self.dof else empty)] for j in range(self.columns)
+            ]
+            self.modes = replace(self.modes, columns=columns, slopes=local_slopes(local), pushes=tuple(map(tuple, pushes)))
 
     def _inputs_of_modes(self, j: int) -> tuple[ModeInput, ...]:
         """The inputs of the modes of column j that are expressions."""
@@ -162,7 +166,7 @@ class Trace:
         return tuple(each._replace(of=slope) for each, slope in slopes if slope is not number(0.0))
 
     def written_out(self, root: Expr) -> Expr:
-        """An expression in which no sums over modes, and no accelerations of modes, are leaves."""
+        """An expression in which no accelerations of modes are leaves."""
         return root if self.modes is None else without_modes(root, self.modes)
 
     def tangent_leaves(self, j: int) -> tuple[list[Expr], list[Expr]]:
@@ -175,8 +179,7 @@ class Trace:
         if root.op == "number":
             return number(0.0)
         total, following = self.partial_derivative(root, j), self.dof * (1 + j)
-        leaves = {node for node in ordered([root]) if node.op in ("coordinate", "velocity", "form")}
-        for leaf in sorted(leaves, key=lambda leaf: (leaf.op == "form", leaf.value, leaf.op)):
+        for leaf in leaves_of(root):
             if leaf.op == "form":
                 along = Expr("form", (), leaf.value._replace(first=leaf.value.first + following))
             else:

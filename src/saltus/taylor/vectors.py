@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
@@ -248,3 +249,33 @@ def dot(pairs: Iterable[tuple[Coefficient, Coefficient]], start: Coefficient = N
             vector, factor = (a, b) if isinstance(a, Vec) else (b, a)
             start = multiply(a, b) if start is None else cast(Vec, vector).fma(factor, start)  # two known numbers come first
     return start
+
+
+@contextmanager
+def loop(builder: Any, begin: int, end: Any, starts: Sequence[Vec] = (), after: list[Vec] | None = None) -> Iterator[Any]:
+    """A loop over whole numbers, at least once. With `after` numbers go through it, which begin with `starts`: the code within
+    appends their next values to it, and they are the last ones afterwards."""
+    before, body = builder.block, builder.append_basic_block("loop")
+    builder.branch(body)
+    builder.position_at_end(body)
+    i = builder.phi(LONG)
+    i.add_incoming(LONG(begin), before)
+    carried = [builder.phi(start.value.type) for start in starts]
+    yield i if after is None else (i, [Vec(builder, x, start.arithmetic) for x, start in zip(carried, starts, strict=True)])
+    for x, start, value in zip(carried, starts, after or (), strict=True):
+        x.add_incoming(start.value, before)
+        x.add_incoming(value.value, builder.block)
+    following = builder.add(i, LONG(1))
+    i.add_incoming(following, builder.block)
+    done = builder.append_basic_block("after")
+    builder.cbranch(builder.icmp_signed("<", following, LONG(end) if isinstance(end, int) else end), body, done)
+    builder.position_at_end(done)
+
+
+def constant_table(builder: Any, numbers: list[float]) -> Any:
+    """LLVM's pointer to an array of constants in the compiled code."""
+    values = ir.Constant(ir.ArrayType(ir.DoubleType(), len(numbers)), numbers)
+    module = builder.module
+    table = ir.GlobalVariable(module, values.type, module.get_unique_name("numbers"))
+    table.linkage, table.global_constant, table.initializer = "internal", True, values
+    return table
