@@ -1,6 +1,8 @@
 """Exponents and verdicts of motions with dry friction, beside closed forms, multipliers and neighbouring motions."""
 
 import math
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -84,3 +86,38 @@ def test_a_body_that_stays_on_still_ground_is_at_rest_wherever_it_stands():
     many = lyapunov_many(still, x=[0.1, 0.2], periods=64, transient=20)
     assert many["ending"].values.tolist() == [Ending.REST, Ending.REST]
     np.testing.assert_allclose(many["exponent"].values[:, 0], 0.0, rtol=0, atol=1e-12)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stribeck(saltus.ContactModel):
+    """x'' + 0.05 x' + x = F(t) + mu(u) sign u on a belt of the speed 0.8, u = 0.8 - x'."""
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+    frictions = (saltus.Friction(name="belt", coordinate="x", kinetic=0.15, static=0.3, ground_speed=0.8, stribeck_speed=0.2),)
+
+    def force(self, t, x, velocity, load):
+        return load.force(t) - x - 0.05 * velocity
+
+
+def sticking(x, velocity, steps=314, periods=24):
+    """Which of many motions of the belt's mass under 0.01 sin(t) stick in the last two periods, by an implicit time stepping."""
+    h, stuck, speed = 2 * math.pi / steps, np.zeros(x.shape, dtype=bool), velocity - 0.8
+    for k in range(periods * steps):
+        middle = x + 0.5 * h * (speed + 0.8)
+        most = h * (0.15 + 0.15 * np.exp(-np.abs(speed) / 0.2))
+        speed = speed + h * (0.01 * math.sin((k + 0.5) * h) - middle - 0.05 * (speed + 0.8))
+        speed = np.where(np.abs(speed) <= most, 0.0, speed - np.sign(speed) * most)
+        x = middle + 0.5 * h * (speed + 0.8)
+        stuck |= (speed == 0.0) & (k >= (periods - 2) * steps)
+    return stuck
+
+
+def test_the_share_of_starts_that_slide_on_beside_stick_slip_is_that_of_a_time_stepping():
+    found = saltus.find_attractors(forced(0.01, 1.0, Stribeck), window=((-1.5, 1.5), (-1.5, 1.5)), starts=128)
+    assert len(found) == 2
+    slides = min(found, key=lambda one: one.amplitude)
+    share = 1.0 - sticking(*np.random.default_rng(5).uniform(-1.5, 1.5, (2, 2000))).mean()
+    assert 0.1 < share < 0.3
+    assert abs(slides.fraction - share) < 2.5 * math.hypot(slides.error, math.sqrt(share * (1.0 - share) / 2000))
+    assert 0.02 < slides.error < 0.05

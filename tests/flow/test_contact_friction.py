@@ -315,6 +315,49 @@ def test_the_motion_of_a_rod_ends_by_name_at_the_angle_where_the_paradox_begins(
     assert np.abs(np.concatenate([edges, np.pi - edges, -edges]) - motion.angle).min() < 1e-11
 
 
+# --- an independent time stepping ----------------------------------------------------------------------------------------------
+
+
+def stepped(system, law, state, duration, steps):
+    """The state at the end by Moreau's midpoint scheme with so many steps: velocities at the ends, forces and gaps in the middle,
+    and in a step in which the gap is closed an impact."""
+    model, mass = system.model, np.array(system.model.mass_matrix(None))
+    h, inverse, q, v = duration / steps, np.linalg.inv(mass), np.array(state[:2]), np.array(state[2:])
+    for _ in range(steps):
+        q = q + 0.5 * h * v
+        free = v + h * (inverse @ [model.push - 0.2 * q[0], -1.0])
+        if q[1] <= 0.0:
+            free = law(inverse, free, v, system.impact.e, model.mu)
+        v, q = free, q + 0.5 * h * free
+    return np.array([*q, *v])
+
+
+def by_moreau(inverse, free, v, e, mu):
+    """The speed of the gap becomes -e times that before the step, unless it is larger without an impulse."""
+    target = max(-e * v[1], 0.0)
+    return free if free[1] >= target else free + inverse @ impulses(inverse, free, target, mu)
+
+
+def by_poisson(inverse, free, v, e, mu):
+    return free if free[1] >= 0.0 else poisson(inverse, free, e, mu)
+
+
+@pytest.mark.parametrize("duration", [1.3, 4.0])  # while it bounces, and after it has come to rest
+@pytest.mark.parametrize(("law", "impact"), [(by_moreau, saltus.NewtonImpact), (by_poisson, saltus.PoissonImpact)])
+def test_a_time_stepping_comes_to_impacts_and_sliding_with_friction_at_first_order(law, impact, duration):
+    steps, errors, seen = 200 * 2 ** np.arange(5), np.zeros(5), set()
+    system = saltus.System(model=Rod(mu=0.4, coupling=0.6, push=0.3), impact=impact(e=0.5))
+    for speed in (2.0, 0.8, 0.3, -0.4, -1.0):
+        motion = saltus.simulate(system, x=0.0, y=0.3, velocity=(speed, 0.0), duration=duration, tol=1e-14)
+        seen |= set(kinds(motion))
+        ends = [stepped(system, law, (0.0, 0.3, speed, 0.0), duration, int(n)) for n in steps]
+        errors += [np.abs(end - motion.final_state).max() for end in ends]
+    assert seen == ({"impact"} if duration < 2.0 else {"impact", "held", "stick", "rest"})
+    order = -np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    assert 0.65 < order < 1.35
+    assert errors[-1] < 0.02
+
+
 # --- friction along the coordinate of a contact, and along a sum -----------------------------------------------------------
 
 
