@@ -290,6 +290,15 @@ def test_a_ball_that_rests_on_a_table_moves_with_it_until_it_is_thrown():
     assert abs(v - 1.6 * math.cos(0.5)) < 1e-15
 
 
+def test_an_orbit_that_rests_on_a_table_is_thrown_where_the_table_falls_faster():
+    orbit = saltus.find_orbit(on_a_table(1.1), x=0.3)
+    release = next(event for event in orbit.motion().events if event.kind == "release")
+    assert release.time % (2 * math.pi) == pytest.approx(math.asin(1.0 / 1.1), abs=1e-11)
+    assert np.abs(orbit.multipliers).max() < 1e-12  # what rests has forgotten its state
+    with pytest.raises(saltus.ParameterError, match="only a saddle has such manifolds"):
+        saltus.stable_manifold(orbit)
+
+
 @pytest.mark.parametrize("e", [0.6, 0.3])
 def test_a_bounce_of_period_one_is_born_and_doubled_where_its_closed_form_says(e):
     """With g = Omega = 1 it is born at a = pi (1 - e) / (1 + e), where the table must give back all that impacts take, and

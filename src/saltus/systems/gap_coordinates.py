@@ -129,9 +129,13 @@ class InGapCoordinates(ContactModel):
         rates = (lambda channel: channel(t), lambda channel: channel.velocity(t), lambda channel: channel.acceleration(t))
         return [weighted(list(m.values()), [rates[order](getattr(load, name)) for name in m]) for m in self.gap_sums()[1]]
 
+    def _each(self, values: Any) -> list[Any]:
+        """The values of all coordinates; those of a single one may be an array of any shape."""
+        return each_of(values) if len(self.coordinates) > 1 else [values]
+
     def own_values(self, t: Any, load: Any, *given: Any) -> list[Any]:
         """The user's coordinates and as many of their derivatives as are given of those of this model, two at most."""
-        moved = [less(each_of(values), self.walls_at(t, load, order)) for order, values in enumerate(given)]
+        moved = [less(self._each(values), self.walls_at(t, load, order)) for order, values in enumerate(given)]
         if not self.is_bent:
             back = inverse(self.gap_sums()[0], self.gap_places.order)
             return [as_given([weighted(row, values) for row in back]) for values in moved]
@@ -139,7 +143,7 @@ class InGapCoordinates(ContactModel):
 
     def gap_values(self, t: Any, load: Any, *given: Any) -> list[Any]:
         """The inverse of `own_values`."""
-        found = [each_of(values) for values in derivatives_along(self._summed, [each_of(values) for values in given])]
+        found = [self._each(values) for values in derivatives_along(self._summed, [self._each(values) for values in given])]
         moved = [[-m for m in self.walls_at(t, load, order)] for order in range(len(found))]
         return [as_given(less(values, m)) for values, m in zip(found, moved, strict=True)]
 
@@ -173,7 +177,7 @@ class InGapCoordinates(ContactModel):
         """T = dq/dz as rows."""
         if not self.is_bent:
             return inverse(self.gap_sums()[0], self.gap_places.order)
-        z, size = less(each_of(theta), self.walls_at(t, load)), range(len(self.coordinates))
+        z, size = less(self._each(theta), self.walls_at(t, load)), range(len(self.coordinates))
         columns = [self._solved([Jet(x, float(i == k)) for i, x in enumerate(z)]) for k in size]
         return [[column[j].first for column in columns] for j in size]
 
@@ -185,7 +189,7 @@ class InGapCoordinates(ContactModel):
     def gap_states(self, t: Any, position: Any, velocity: Any, load: Any) -> tuple[np.ndarray, np.ndarray]:
         """The inverse of `own_states`, in which what contacts hold up to rounding is held exactly."""
         places, rates = self.gap_values(t, load, _values(position), _values(velocity))
-        q, v = np.split(_stacked([*each_of(places), *each_of(rates)]), 2)
+        q, v = np.split(_stacked([*self._each(places), *self._each(rates)]), 2)
         for contact in self.contacts:
             place, at = self.coordinates.index(contact.coordinate), np.asarray(contact.position, dtype=float)
             there = np.abs(q[place] - at) <= CLOSED_BELOW * (1.0 + np.abs(q).max(axis=0))
@@ -206,8 +210,8 @@ class InGapCoordinates(ContactModel):
     def force(self, t: Any, theta: Any, velocity: Any, load: Any, *sides: Any) -> Any:
         """T' (r - M a), where a is q'' for z'' = 0."""
         q, v, carried = self.own_values(t, load, theta, velocity, as_given([0.0] * len(self.coordinates)))
-        pushed, mass = each_of(super().force(t, q, v, load, *sides)), _rows_of(super().mass_matrix(q))
-        pushed = less(pushed, [weighted(row, each_of(carried)) for row in mass])
+        pushed, mass = self._each(super().force(t, q, v, load, *sides)), _rows_of(super().mass_matrix(q))
+        pushed = less(pushed, [weighted(row, self._each(carried)) for row in mass])
         return as_given([weighted(column, pushed) for column in zip(*self.own_slopes(t, theta, load), strict=True)])
 
     def normal_forces(self, t: Any, theta: Any, velocity: Any, load: Any) -> tuple[Any, ...]:
@@ -231,7 +235,7 @@ class InGapCoordinates(ContactModel):
         q, v, a = self.own_values(t, load, theta, velocity, acceleration)
         found = dict(super().margins(t, q, v, a, side, load))
         for place, name in self.gap_places.stands:
-            found[name + TURNS] = self._function(name, [Jet(x, float(i == place)) for i, x in enumerate(each_of(q))]).first
+            found[name + TURNS] = self._function(name, [Jet(x, float(i == place)) for i, x in enumerate(self._each(q))]).first
         return found
 
 
