@@ -112,10 +112,8 @@ class SweepRequest:
         if it has none, of `max_period` forcing periods, but of no more than each value is kept for."""
         names, extrema, given = self.system.model.coordinates, [[row.lowest[0], row.highest[0]]], dict(self.functions or {})
         if given or len(names) > 1:
-            system, periods = (
-                self.system.with_({self.path: float(value)}),
-                int(row.period[0]) or min(self.max_period, self.periods),
-            )
+            system = self.system.with_({self.path: float(value)})
+            periods = int(row.period[0]) or min(self.max_period, self.periods)
             motion = simulate(system, **arguments_of(system, row.last[0]), periods=periods, tol=self.tol)
             extrema = motion.extrema.tolist() if len(names) > 1 else extrema
         found = {f"largest_{name}": high for name, (_, high) in zip(names, extrema, strict=True)}
@@ -368,7 +366,7 @@ def _dataset(asked: SweepRequest, runs: tuple[_OneWay, _OneWay], jumps: list[tup
     for i, state in enumerate(state_names(names)):
         columns[state] = (partial(_state_of, i), model.unit_of(names[i % len(names)]), f"{state} at phase 0")
     table = {key: np.full((2, count), np.nan) for key in columns}
-    outcome = np.full((2, count), "", dtype="<U8")
+    outcome = np.full((2, count), "", dtype=f"<U{max(len(each.name) for each in Ending)}")
     texts = {
         f"{most}_{each}": {"units": model.unit_of(each), "long_name": f"{most} {each} in a period"}
         for most in ("largest", "smallest")
