@@ -86,7 +86,6 @@ from .systems import VelocityReduction as VelocityReduction
 from .systems import WallOscillator as WallOscillator
 from .systems import energy_gain as energy_gain
 from .systems import register as register
-from .systems.cell_chain import CellChain as CellChain
 from .systems.contact_model import Contact as Contact
 from .systems.contact_model import Friction as Friction
 from .systems.contact_model import Surface as Surface
@@ -108,6 +107,7 @@ from .systems.pulses import Ricker as Ricker
 from .systems.si_units import PhysicalBlock as PhysicalBlock
 from .systems.si_units import PhysicalCell as PhysicalCell
 from .systems.structure import Structure as Structure
+from .systems.two_layer import CellChain as CellChain
 from .systems.two_layer import TwoLayer as TwoLayer
 from .systems.unit_cell import UnitCell as UnitCell
 from .web.study_page import Explorer as Explorer

@@ -560,15 +560,6 @@ def model_with(*contacts, names=("x", "y"), frictions=(), body=None):
 
 SUM = {"x": 1.0, "y": 1.0}
 REFUSED = {
-    "which follows from what a, b keep": (
-        Contact(name="a", coordinate="x"),
-        Contact(name="b", coordinate="y"),
-        Contact(name="c", coordinate=SUM),
-    ),
-    "up to a displacement": (
-        Contact(name="a", coordinate={"x": 1.0, "ground": -1.0}),
-        Contact(name="b", coordinate="x", sign=-1),
-    ),
     "holds 'force', none of x, y, ground": (Contact(name="a", coordinate={"x": 1.0, "force": 1.0}),),
     "holds 'w', none of": (Contact(name="a", coordinate={"w": 1.0}),),
     "coefficients that are numbers other than 0, got 0.0": (Contact(name="a", coordinate={"x": 0.0, "y": 1.0}),),

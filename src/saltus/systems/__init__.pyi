@@ -1,9 +1,8 @@
 from .contact_model import ContactModel as ContactModel
-from .contact_model import constrained_acceleration as constrained_acceleration
-from .contact_model import friction_margins as friction_margins
 from .contact_model import mass_and_force as mass_and_force
 from .contact_model import mass_rows as mass_rows
 from .contact_model import reactions as reactions
+from .contact_model import solved_motion as solved_motion
 from .contact_model import stick_margins as stick_margins
 from .drawings import Shape as Shape
 from .drawings import drawing_of as drawing_of
@@ -12,6 +11,7 @@ from .impact_laws import ImpactLaw as ImpactLaw
 from .impact_laws import VelocityReduction as VelocityReduction
 from .impact_laws import energy_gain as energy_gain
 from .impact_laws import energy_gains as energy_gains
+from .impact_laws import friction_margins as friction_margins
 from .load import Channel as Channel
 from .load import DeclaredLoad as DeclaredLoad
 from .load import Load as Load

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -264,7 +264,7 @@ class ContactModel(Model):
             The load, whose channels are called with the time: `load.horizontal(t)`.
         """
         size = len(self.coordinates)
-        solved = constrained_acceleration(self, t, theta, velocity, load, [1.0] * size)
+        solved = solved_motion(self, t, theta, velocity, load, [1.0] * size).acceleration
         return solved[0] if size == 1 else tuple(solved)
 
     @property
@@ -357,9 +357,17 @@ class ContactModel(Model):
         return (1.0,) * len(self.frictions)
 
 
-def constrained_acceleration(
+class SolvedMotion(NamedTuple):
+    """What `solved_motion` finds."""
+
+    acceleration: list[Any]
+    along: dict[int, Any]  # the force along each dependent sum, by its place among the coordinates
+    sums: dict[int, list[Any]]  # and its row for impacts, in the place of that of the mass matrix: minus its coefficients, then 1
+
+
+def solved_motion(
     model: Model, t: Any, q: Any, v: Any, load: Any, free: Sequence[Any], slides: Sequence[Any] = ()
-) -> list[Any]:
+) -> SolvedMotion:
     """The accelerations a of (D M D + 1 - D) a = D r, with D = diag(free): 1 where a coordinate is free, 0 where it is held.
 
     r has the force of each friction that slides, -mu N s with its direction s in `slides`, 0 where it sticks. Behind them may
@@ -368,14 +376,26 @@ def constrained_acceleration(
 
     q and v are scalars where there is one coordinate, else tuples. The matrix is eliminated from its first row on, without
     exchanging rows, as the pivots of a positive definite matrix are positive; rows of frictions in contacts come last.
+
+    A dependent sum (`InGapCoordinates`) has a row g of coefficients of the others. While its contact is closed, h = 1, and else
+    h = 0, a force l acts along it, which keeps g a = b:
+
+        D M a - h D g' l = D r,    h g D a + (1 - h) l = h b.
     """
     load = _on_sides(model, load, slides)
     mass, force = mass_and_force(model, t, q, v, load)
     late = _add_frictions(model, v, mass, force, (normal_forces(model, t, q, v, load), slides, free))
     size = len(force)
-    matrix = [[_held(mass[i][j], i, j, free) for j in range(size)] for i in range(size)]
+    matrix = [[held_entry(mass[i][j], i, j, free) for j in range(size)] for i in range(size)]
     right = [free[i] * force[i] for i in range(size)]
-    order = [*(i for i in range(size) if i not in late), *late]
+    sums = dependent_sums(model, t, q, v, load)
+    for place, (row, bend) in sums.items():
+        held = 1.0 - free[place]
+        for j, entry in enumerate(row):
+            matrix[place][j] = 0.0 if is_zero(entry) else held * free[j] * entry
+            matrix[j][place] = 0.0 if is_zero(entry) else -matrix[place][j]
+        matrix[place][place], right[place] = free[place], held * bend
+    order = [*(i for i in range(size) if i not in late and i not in sums), *late, *sums]
     for number, k in enumerate(order):
         for i in order[number + 1 :]:
             if is_zero(matrix[i][k]):
@@ -391,7 +411,15 @@ def constrained_acceleration(
             if not is_zero(matrix[i][j]):
                 value = value - matrix[i][j] * solved[j]
         solved[i] = value / matrix[i][i]
-    return solved
+    along = {place: (1.0 - free[place]) * solved[place] for place in sums}
+    rows = {i: [1.0 if j == i else 0.0 if is_zero(x) else -x for j, x in enumerate(row)] for i, (row, _) in sums.items()}
+    return SolvedMotion([free[i] * force[i] if i in sums else x for i, x in enumerate(solved)], along, rows)
+
+
+def dependent_sums(model: Any, t: Any, q: Any, v: Any, load: Any) -> dict[int, tuple[list[Any], Any]]:
+    """The dependent sums of a model in coordinates of its gaps, by their places among these (`InGapCoordinates`)."""
+    found = model.dependent_sums(t, q, v, load) if getattr(model, "dependent", 0) else []
+    return dict(enumerate(found, len(model.coordinates) - len(found)))
 
 
 def _add_frictions(model: Model, v: Any, mass: list[list[Any]], force: list[Any], given: tuple[Any, ...]) -> list[int]:
@@ -404,7 +432,7 @@ def _add_frictions(model: Model, v: Any, mass: list[list[Any]], force: list[Any]
             force[place] = force[place] - friction.slipping(rates[place], s) * normal
     for friction, s in zip(model.frictions, slides, strict=False):
         if friction.contact is not None:
-            place, contact = names.index(friction.coordinate), _contact_of(model, friction)
+            place, contact = names.index(friction.coordinate), contact_of(model, friction)
             held = names.index(contact.coordinate)
             share = contact.sign * friction.slipping(rates[place], s) * (1.0 - free[held])
             mass[place] = [a if is_zero(b) else a + share * b for a, b in zip(mass[place], mass[held], strict=True)]
@@ -413,20 +441,22 @@ def _add_frictions(model: Model, v: Any, mass: list[list[Any]], force: list[Any]
     return list(late)
 
 
-def _contact_of(model: Model, friction: Friction) -> Contact:
+def contact_of(model: Model, friction: Friction) -> Contact:
     """The contact whose reaction presses a friction."""
     return next(contact for contact in model.contacts if contact.name == friction.contact)
 
 
-def reactions(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any, slides: Sequence[Any] = ()) -> list[Any]:
+def reactions(
+    model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any, slides: Sequence[Any] = (), along: Any = ()
+) -> list[Any]:
     """The force of each contact along its sign, sign (M a - r)_i; 0 where its coordinate is free.
 
     r then has the force of a friction along this coordinate. While it sticks it carries what it can, so that the force is
     sign (M a - r)_i + mu_s N, which vanishes when the friction cannot hold the coordinate alone any more. Without `slides` it
-    does what it does in a closed contact.
+    does what it does in a closed contact. `along` has the forces along dependent sums (`solved_motion`), which are reactions.
     """
     slides = slides if len(slides) else [np.sign(-friction.ground_speed) for friction in model.frictions]
-    lacking, names = _lacking(model, t, q, v, a, _on_sides(model, load, slides)), model.coordinates
+    lacking, names = _lacking(model, t, q, v, a, (_on_sides(model, load, slides), along)), model.coordinates
     found = [contact.sign * lacking[names.index(contact.coordinate)] for contact in model.contacts]
     for friction, normal, s in zip(model.frictions, _pressing(model, t, q, v, load, lacking), slides, strict=False):
         for i, contact in enumerate(model.contacts):
@@ -436,9 +466,11 @@ def reactions(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any,
     return found
 
 
-def stick_margins(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any, slides: Sequence[Any] = ()) -> list[Any]:
+def stick_margins(
+    model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any, slides: Sequence[Any] = (), along: Any = ()
+) -> list[Any]:
     """mu_s N - l and mu_s N + l of each friction, one after the other, with the force l = (M a - r)_i that makes it stick."""
-    lacking, margins = _lacking(model, t, q, v, a, _on_sides(model, load, slides)), []
+    lacking, margins = _lacking(model, t, q, v, a, (_on_sides(model, load, slides), along)), []
     for friction, normal in zip(model.frictions, _pressing(model, t, q, v, load, lacking), strict=True):
         force, most = lacking[model.coordinates.index(friction.coordinate)], friction.most * normal
         margins += [most - force, most + force]
@@ -450,7 +482,7 @@ def _pressing(model: Model, t: Any, q: Any, v: Any, load: Any, lacking: Sequence
     forces = list(normal_forces(model, t, q, v, load))
     for k, friction in enumerate(model.frictions):
         if friction.contact is not None:
-            contact = _contact_of(model, friction)
+            contact = contact_of(model, friction)
             forces[k] = contact.sign * lacking[model.coordinates.index(contact.coordinate)]
     return forces
 
@@ -470,47 +502,17 @@ def normal_forces(model: Any, t: Any, q: Any, v: Any, load: Any) -> tuple[Any, .
     return tuple(given)
 
 
-def friction_margins(
-    model: Model, t: Any, q: Any, v: Any, load: Any, free: Sequence[Any], slides: Sequence[Any]
-) -> dict[str, Any]:
-    """What must stay positive for each friction, by the name of the limit at which a motion ends where it vanishes.
-
-    That is the normal force. Of one in a contact it decides whether a reaction is the only one: with the Schur complement m of M
-    over the free coordinates, t of the friction and n of the contact along its sign, m_tt + s mu m_nt, and where it sticks
-    m_tt - mu abs(m_nt), with mu_s and times positive numbers.
-    """
-    forces, names = normal_forces(model, t, q, v, load), model.coordinates
-    found: dict[str, Any] = {}
-    for friction, force, s in zip(model.frictions, forces, slides, strict=False):
-        found[friction.limit] = force
-        if friction.contact is not None:
-            place, contact = names.index(friction.coordinate), _contact_of(model, friction)
-            own, across = schur_complement(mass_rows(model, q, t, load), place, names.index(contact.coordinate), free)
-            rubs = friction.most * (1.0 - free[names.index(contact.coordinate)]) * across
-            found[friction.limit] = (own + contact.sign * s * rubs) * (own * own - (1.0 - s * s) * rubs * rubs)
-    return found
-
-
-def schur_complement(mass: Sequence[Sequence[Any]], place: int, held: int, free: Sequence[Any]) -> tuple[Any, Any]:
-    """The entries (t, t) and (n, t) of the mass matrix, t = `place` and n = `held`, after the elimination of the other free
-    coordinates."""
-    others = [k for k in range(len(mass)) if k not in (place, held)]
-    masks = [1.0 if k in (place, held) else f for k, f in enumerate(free)]
-    rows = [[_held(entry, i, j, masks) for j, entry in enumerate(row)] for i, row in enumerate(mass)]
-    for number, k in enumerate(others):
-        later = others[number + 1 :]
-        for i in (*later, place, held):
-            if not is_zero(rows[i][k]):
-                factor = rows[i][k] / rows[k][k]
-                for j in (*later, place):
-                    rows[i][j] = rows[i][j] - factor * rows[k][j]
-    return rows[place][place], rows[held][place]
-
-
-def _lacking(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any) -> list[Any]:
-    """M a - r, the force that must act on each coordinate besides r for these accelerations."""
+def _lacking(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], given: tuple[Any, Any]) -> list[Any]:
+    """M a - r, the force that must act on each coordinate besides r, and besides those along dependent sums, for these
+    accelerations; of a dependent sum the force along it."""
+    load, along = given
     mass, force = mass_and_force(model, t, q, v, load)
-    return [sum(m * x for m, x in zip(row, a, strict=True) if not is_zero(m)) - r for row, r in zip(mass, force, strict=True)]
+    found = [sum(m * x for m, x in zip(row, a, strict=True) if not is_zero(m)) - r for row, r in zip(mass, force, strict=True)]
+    for place, (row, _) in dependent_sums(model, t, q, v, load).items():
+        found[place] = along[place]
+        for j, entry in enumerate(row):
+            found[j] = found[j] if is_zero(entry) else found[j] - entry * along[place]
+    return found
 
 
 def mass_and_force(model: Any, t: Any, q: Any, v: Any, load: Any) -> tuple[list[list[Any]], list[Any]]:
@@ -554,7 +556,7 @@ def sides_for(model: Any, t: Any, q: Any, load: Any) -> tuple[Sides, ...]:
     return (Sides({each.name: each.side(kept(each)) for each in model.surfaces}),)
 
 
-def _held(entry: Any, i: int, j: int, free: Sequence[Any]) -> Any:
+def held_entry(entry: Any, i: int, j: int, free: Sequence[Any]) -> Any:
     """An entry of D M D + 1 - D."""
     if i != j:
         return 0.0 if is_zero(entry) else free[i] * free[j] * entry

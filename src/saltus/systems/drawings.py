@@ -12,12 +12,11 @@ import numpy as np
 
 from saltus.checks import check_states
 from saltus.errors import ParameterError
-from saltus.systems.cell_chain import CellChain
 from saltus.systems.metainterface import Metainterface
 from saltus.systems.model import Model
 from saltus.systems.oscillators import BeltOscillator, ImpactPair, RockingBlock, TwoStops, WallOscillator
 from saltus.systems.system import System
-from saltus.systems.two_layer import TwoLayer
+from saltus.systems.two_layer import CellChain, TwoLayer
 from saltus.systems.unit_cell import CellLayout, UnitCell
 
 BASE = 1.4  # of a cell whose model says nothing of it: the horizontal edges in units of l

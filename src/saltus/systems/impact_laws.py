@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections import UserDict
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -11,7 +12,16 @@ import numpy as np
 
 from saltus.checks import answered, check_number, settle_numbers
 from saltus.errors import ParameterError
-from saltus.systems.contact_model import Contact, ContactModel, Friction, mass_rows
+from saltus.systems.contact_model import (
+    Contact,
+    ContactModel,
+    Friction,
+    contact_of,
+    held_entry,
+    is_zero,
+    mass_rows,
+    normal_forces,
+)
 from saltus.systems.gap_coordinates import in_gap_coordinates
 from saltus.systems.load import Load
 from saltus.systems.model import Model, OneContactModel
@@ -409,3 +419,40 @@ def check_paradox(model: ContactModel) -> None:
                     "smaller coefficient",
                     "model",
                 )
+
+
+def friction_margins(
+    model: Model, t: Any, q: Any, v: Any, load: Any, free: Sequence[Any], slides: Sequence[Any]
+) -> dict[str, Any]:
+    """What must stay positive for each friction, by the name of the limit at which a motion ends where it vanishes.
+
+    That is the normal force. Of one in a contact it decides whether a reaction is the only one: with the Schur complement m of M
+    over the free coordinates, t of the friction and n of the contact along its sign, m_tt + s mu m_nt, and where it sticks
+    m_tt - mu abs(m_nt), with mu_s and times positive numbers.
+    """
+    forces, names = normal_forces(model, t, q, v, load), model.coordinates
+    found: dict[str, Any] = {}
+    for friction, force, s in zip(model.frictions, forces, slides, strict=False):
+        found[friction.limit] = force
+        if friction.contact is not None:
+            place, contact = names.index(friction.coordinate), contact_of(model, friction)
+            own, across = schur_complement(mass_rows(model, q, t, load), place, names.index(contact.coordinate), free)
+            rubs = friction.most * (1.0 - free[names.index(contact.coordinate)]) * across
+            found[friction.limit] = (own + contact.sign * s * rubs) * (own * own - (1.0 - s * s) * rubs * rubs)
+    return found
+
+
+def schur_complement(mass: Sequence[Sequence[Any]], place: int, held: int, free: Sequence[Any]) -> tuple[Any, Any]:
+    """The entries (t, t) and (n, t) of the mass matrix, t = `place` and n = `held`, after the elimination of the other free
+    coordinates."""
+    others = [k for k in range(len(mass)) if k not in (place, held)]
+    masks = [1.0 if k in (place, held) else f for k, f in enumerate(free)]
+    rows = [[held_entry(entry, i, j, masks) for j, entry in enumerate(row)] for i, row in enumerate(mass)]
+    for number, k in enumerate(others):
+        later = others[number + 1 :]
+        for i in (*later, place, held):
+            if not is_zero(rows[i][k]):
+                factor = rows[i][k] / rows[k][k]
+                for j in (*later, place):
+                    rows[i][j] = rows[i][j] - factor * rows[k][j]
+    return rows[place][place], rows[held][place]

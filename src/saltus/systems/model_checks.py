@@ -13,7 +13,8 @@ import numpy as np
 
 from saltus.errors import ParameterError, SaltusError, shown
 from saltus.systems.contact_model import MOST_CONTACTS, MOST_FRICTIONS, Contact, ContactModel, Friction, Surface, sides_for
-from saltus.systems.gap_coordinates import INVERSE, InGapCoordinates, Part
+from saltus.systems.gap_coordinates import InGapCoordinates
+from saltus.systems.gap_places import INVERSE, Part
 from saltus.systems.impact_laws import ImpactLaw, check_paradox
 from saltus.systems.load import DeclaredLoad, Load
 from saltus.systems.model import SCALES, Jet, Model, OneContactModel, as_given, check_one_contact, is_function
@@ -129,7 +130,7 @@ def _check_first_order(model: Model) -> None:
     parts: tuple[Contact | Friction | Surface, ...] = (*model.contacts, *model.frictions, *model.surfaces)
     for part in parts:
         terms = [part.coordinate] if isinstance(part.coordinate, str) else list(part.coordinate)
-        held = [name for name in terms if name in given]
+        held = [name for name in terms if name in getattr(model, "own_class", model).first_order]
         if held and not (isinstance(part, Surface) and len(terms) == 1):
             what = type(part).__name__.lower()
             raise ParameterError(

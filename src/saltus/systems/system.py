@@ -191,6 +191,7 @@ class System:
             q, v = (x.item() if x.size == 1 else tuple(x.tolist()) for x in np.split(state, 2))
             rates = np.atleast_1d(np.array(model.acceleration(time, q, v, 1, DeclaredLoad(self.load, model)), dtype=float))
             state[len(state) - len(model.first_order) :] = rates[len(model.moving) :]
+            getattr(model, "closed_exactly", lambda *given: given)(*np.split(state, 2))
         return state
 
     def mirrored(self) -> System | None:
@@ -377,10 +378,11 @@ def check_system(
     coordinates: int | None = None,
     several_contacts: bool = False,
     sums: bool = True,
+    dependent: bool = False,
 ) -> None:
     """Refuse anything but a System whose model has the contacts and the number of coordinates that `asking` is for.
 
-    Without `sums` its contacts and surfaces must each be those of a single coordinate.
+    Without `sums` each contact and surface must be of a single coordinate, without `dependent` no sum may follow from others.
 
     Raises
     ------
@@ -389,7 +391,7 @@ def check_system(
     """
     if not isinstance(system, System):
         raise ParameterError(f"{asking} takes a System(model=..., load=..., impact=...), got {shown(system)}", "system")
-    if several_contacts and sums and coordinates is None:
+    if several_contacts and sums and dependent and coordinates is None:
         return
     inner, names = system.in_gap_coordinates, system.model.coordinates
     if inner is not system and not sums:
@@ -398,6 +400,9 @@ def check_system(
             f"{', '.join(inner.model.coordinates)}",
             "system",
         )
+    if not dependent and (left := getattr(inner.model, "dependent", 0)):
+        what = f"sums that follow from those of others, here {', '.join(inner.model.coordinates[-left:])}"
+        raise ParameterError(f"{asking} does not take {what}; simulate, simulate_many and sensitivities do", "system")
     if coordinates is not None and (len(names) != coordinates or system.model.first_order):
         wanted = "one coordinate" if coordinates == 1 else f"{coordinates} coordinates"
         what = ", ".join(names) + " of first order" * (len(names) == coordinates)

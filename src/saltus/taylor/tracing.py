@@ -12,11 +12,11 @@ from saltus.systems import (
     Harmonic,
     Pulse,
     System,
-    constrained_acceleration,
     friction_margins,
     mass_rows,
     numbers,
     reactions,
+    solved_motion,
     stick_margins,
 )
 from saltus.systems import substitute as substitute_numbers
@@ -71,6 +71,7 @@ class Trace:
     parameters: list[str] = field(default_factory=list)
     dof: int = 1  # of the model
     first_order: int = 0  # how many of its coordinates, the last ones, are of first order
+    dependent: int = 0  # how many of these are sums of others, with minus their coefficients in their rows of `mass`
     columns: int = 0
     paths: tuple[str, ...] = ()  # of the parameters that the last columns are derivatives to
     records: list[tuple[str, int]] = field(default_factory=list)  # dotted path, order of the derivative (see `load_tables.py`)
@@ -224,9 +225,9 @@ def trace(
         The model does not have a margin, or a path leads to no number.
     """
     paths = None if sensitivities is None else check_paths(system, sensitivities)
-    sides = system.model.sides
-    result = Trace(model=type(system.model).__name__, side_count=len(sides), dof=len(system.model.coordinates))
-    result.first_order = len(system.model.first_order)
+    sides, inner = system.model.sides, system.in_gap_coordinates.model
+    result = Trace(model=type(system.model).__name__, side_count=len(sides), dof=len(inner.coordinates))
+    result.first_order, result.dependent = len(inner.first_order), getattr(inner, "dependent", 0)
     twin = substitute_numbers(system.in_gap_coordinates, result.symbol)
     _name_records(twin.load)
     object.__setattr__(twin, "load", DeclaredLoad(twin.load, twin.model))
@@ -320,7 +321,8 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
     if local < result.dof:
         q, v = local_parts(q, v, local)
     a, slides = ([Expr(op, (), i) for i in range(n)] for op, n in (("acceleration", local), ("slide", len(parts))))
-    holding = [f for forces in (reactions, stick_margins) for f in forces(model, t, q, v, a, load, slides)]
+    found, along, sums = solved_motion(model, t, q, v, load, [Expr("free", (), i) for i in range(local)], slides)
+    holding = [f for forces in (reactions, stick_margins) for f in forces(model, t, q, v, a, load, slides, along)]
     result.reactions = [combine("add", r, 0.0) for r in (*holding, *[1.0] * (2 * len(model.surfaces)))]
     if model.rubs_in_contacts:
         given = float(twin.impact.has_phases), *(getattr(part, "kinetic", 0.0) for part in parts)
@@ -331,14 +333,13 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
     result.ground_speeds = [combine("add", w, 0.0) for w in speeds]
     places = [model.coordinates.index(part.coordinate) for part in parts]
     result.friction_coordinates = tuple(p if k < len(frictions) else -1 - p for k, p in enumerate(places))
-    result.mass = [combine("add", entry, 0.0) for row in mass_rows(model, q, t, load) for entry in row]
+    result.mass = [combine("add", x, 0.0) for i, row in enumerate(mass_rows(model, q, t, load)) for x in sums.get(i, row)]
     result.restitution = [combine("add", entry, 0.0) for row in twin.impact.restitution_matrix(model) for entry in row]
     result.positions = [combine("add", contact.position, 0.0) for contact in contacts]
     afters = [ask(model, "after_impact", contact.name, q, v) for contact in contacts if result.first_order]
     result.jumps = [combine("add", x, 0.0) for after in afters for x in (after if isinstance(after, (tuple, list)) else (after,))]
     result.signs = tuple(contact.sign for contact in contacts)
     result.contact_coordinates = tuple(model.coordinates.index(contact.coordinate) for contact in contacts)
-    found = constrained_acceleration(model, t, q, v, load, [Expr("free", (), i) for i in range(local)], slides)
     if local < result.dof:
         result.modes = mode_block(model.mode_equations(t, q, v, load), local, result.dof - local, q.sums)
         found += [Expr("mode", (), i) for i in range(local, result.dof)]

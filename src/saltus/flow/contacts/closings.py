@@ -195,7 +195,7 @@ def block_of(motion, hit, backwards):
         grows = False
         for a in range(local):
             for b in range(local):
-                if joined[a] and not joined[b] and is_there(motion, local * a + b):
+                if joined[a] and not joined[b] and (is_there(motion, local * a + b) or is_there(motion, local * b + a)):
                     joined[b] = grows = True
         for i in range(count):
             for k in range(count):

@@ -50,8 +50,13 @@ def eliminate(block, size, columns):
 
 
 @lean_jit
-def invert(numbers, size, block, inverse):
-    """The inverse of a matrix that is given by its rows; False if it is singular."""
+def invert(numbers, size, first_order, block, inverse):
+    """The inverse of a mass matrix that is given by its rows; False if it is singular.
+
+    The last rows, of coordinates of first order, have minus the coefficients g of dependent sums (`InGapCoordinates`). In place
+    of the inverse there are g M^-1, its transpose, and g M^-1 g', so that a force along a sum acts by the same entries as others;
+    they are 0 for coordinates that are no sums.
+    """
     for i in range(size):
         for j in range(size):
             block[i, j] = numbers[i * size + j]
@@ -60,6 +65,11 @@ def invert(numbers, size, block, inverse):
     for i in range(size):
         for j in range(size):
             inverse[i, j] = block[i, size + j]
+    for d in range(size - first_order, size):
+        for i in range(size):
+            inverse[i, d] = 0.0
+            for j in range(size - first_order):
+                inverse[i, d] -= inverse[i, j] * numbers[d * size + j]
     return regular
 
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from saltus.flow.contacts.complementarity import eliminate
 from saltus.flow.contacts.impacts import record_contact_event
-from saltus.flow.contacts.layout import ContactColumn, FrictionColumn, NoMargin, ground_speed
+from saltus.flow.contacts.layout import ContactColumn, FrictionColumn, NoMargin, ground_speed, is_sum
 from saltus.flow.contacts.tangent import move_columns, note_shifts, slope
 from saltus.flow.kernel.layout import EXACT, ZERO, EventCode, Mode
 from saltus.flow.kernel.roots import NEVER, SIMPLE, contact_root, leading
@@ -368,11 +368,14 @@ def tear_loose(motion, i):
 
 @lean_jit
 def all_stand(motion):
-    """Whether no coordinate moves: none is free, and all sticking ones do so on ground at rest."""
-    for i in range(motion.parameters.size - motion.local, motion.parameters.size):
-        if motion.parameters[i] != 0.0:
-            return False
-    moves = motion.local < motion.own
+    """Whether no coordinate moves: none is free, and all sticking ones do so on ground at rest. As many may be free as there are
+    dependent sums."""
+    local, free, moves = motion.local, 0, motion.local < motion.own
+    for i in range(local):
+        free += 1 if motion.parameters[motion.parameters.size - local + i] != 0.0 else 0
+        free -= 1 if is_sum(motion, i) else 0
+    if free > 0:
+        return False
     for k in range(motion.frictions.shape[0]):
         is_friction = motion.frictions[k, FrictionColumn.MARGIN] != NoMargin.SURFACE
         moves = moves or (is_friction and ground_speed(motion, k) != 0.0)

@@ -10,7 +10,15 @@ import math
 import numpy as np
 
 from saltus.flow.contacts.complementarity import acting, complementary, invert, push, tell_instant
-from saltus.flow.contacts.layout import FINISHED, MOST_FROZEN_IMPACTS, VANISHED, ContactColumn, contact_position, restitution
+from saltus.flow.contacts.layout import (
+    FINISHED,
+    MOST_FROZEN_IMPACTS,
+    VANISHED,
+    ContactColumn,
+    contact_position,
+    jumping,
+    restitution,
+)
 from saltus.flow.kernel.layout import CHATTER_SPEED, EXACT, SLOW, Mode
 from saltus.flow.kernel.steps import column_step, leaps, step_size
 from saltus.taylor import lean_jit
@@ -71,7 +79,7 @@ def fill_contact_matrices(motion):
     count, signs = motion.contacts.shape[0], motion.signs
     tell_instant(motion)
     motion.matrices(motion.env, motion.piece, motion.state, motion.solver_numbers)
-    regular = invert(motion.solver_numbers, motion.local, motion.block, motion.inverse)
+    regular = invert(motion.solver_numbers, motion.local, motion.first_order, motion.block, motion.inverse)
     for i in range(count):
         a = motion.contacts[i, ContactColumn.COORDINATE]
         for j in range(count):
@@ -166,12 +174,6 @@ def apply_impulses(motion):
         for j in range(motion.contacts.shape[0]):
             gain = motion.inverse[i, motion.contacts[j, ContactColumn.COORDINATE]] * motion.signs[j]
             motion.velocities[i] += gain * motion.impulses[j]
-
-
-@lean_jit
-def jumping(motion, i):
-    """What of a coordinate may jump at an event: its velocity, or the value of one of first order."""
-    return motion.coordinates[i] if i >= motion.own - motion.first_order else motion.velocities[i]
 
 
 @lean_jit

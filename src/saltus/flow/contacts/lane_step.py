@@ -282,7 +282,7 @@ def step_all(lanes):
 @inline_jit
 def resolve_all(lanes, hit, which):
     """Apply the impact law in the lanes in `hit`, together where that is possible; returns the resolved lanes."""
-    resolved = 0 if lanes.sizes.jumps > 0 else resolve_impacts(lanes, hit, which)
+    resolved = 0 if lanes.sizes.jumps > 0 or lanes.sizes.dependent > 0 else resolve_impacts(lanes, hit, which)
     waiting = hit & ~resolved
     while waiting:
         i, impact = first_lane(waiting), lanes.helpers.impact

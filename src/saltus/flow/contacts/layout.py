@@ -174,6 +174,22 @@ def contact_position(motion, i):
 
 
 @lean_jit
+def is_sum(motion, i):
+    """Whether a coordinate is a dependent sum: its row of the mass matrix has minus the coefficients of others."""
+    local, found = motion.local, False
+    for j in range(local - motion.first_order if i >= local - motion.first_order else 0):
+        found = found or motion.solver_numbers[local * i + j] != 0.0
+    return found
+
+
+@lean_jit
+def jumping(motion, i):
+    """What of a coordinate may jump at an event: its velocity, or the value of one of first order that is no dependent sum."""
+    follows = i >= motion.own - motion.first_order and not is_sum(motion, i)
+    return motion.coordinates[i] if follows else motion.velocities[i]
+
+
+@lean_jit
 def ground_speed(motion, k):
     """The speed of a friction's ground."""
     return motion.solver_numbers[motion.solver_numbers.size - motion.frictions.shape[0] + k]

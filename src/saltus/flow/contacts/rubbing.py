@@ -216,7 +216,7 @@ def rest_columns(motion, near):
         for i in range(motion.contacts.shape[0]):
             motion.jump[a] += push(motion, a, i) * motion.impulses[i]
     if is_pressed(motion):
-        invert(motion.solver_numbers, local, motion.block, motion.inverse)
+        invert(motion.solver_numbers, local, motion.first_order, motion.block, motion.inverse)
         for j in range(motion.columns):
             for i in range(motion.contacts.shape[0]):
                 motion.pull_slopes[j, i] = 0.0

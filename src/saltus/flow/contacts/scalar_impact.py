@@ -52,7 +52,7 @@ def contacts_impact(lane, hit):
         return 0
     jump_first_order(motion, hit)
     apply_impulses(motion)
-    free = own
+    free = own - lane.sizes.dependent
     for i in range(contacts.shape[0]):
         if chosen >> i & 1:
             settle_contact(motion, i, rates[i])

@@ -166,17 +166,20 @@ def impulse_columns(motion, acts, chosen):
 
         M dw + dM w = S dJ,    (dw)_i = -dv_i - sum_j (E_ij dv_j + dE_ij v_j)  of the acting contacts, along their signs.
 
-    `solver` holds the coupling, the inverse of M, the rates before the impact (in `GAPS`) and w (in `JUMP`).
+    `solver` holds the coupling, the inverse of M, the rates before the impact (in `GAPS`) and w (in `JUMP`). For a dependent sum,
+    w = g w of the others, dg w is added.
     """
     own, local, count, signs = motion.own, motion.local, motion.contacts.shape[0], motion.signs
-    inverse, twist, right = motion.inverse, np.zeros(local), motion.right
+    inverse, twist, right, moving = motion.inverse, np.zeros(local), motion.right, local - motion.first_order
     fill_slopes(motion)
     for j in range(motion.columns):
         for a in range(local):  # M^-1 dM w
             twist[a] = 0.0
-            for b in range(local):
-                for c in range(local):
+            for c in range(moving):
+                for b in range(moving):
                     twist[a] += inverse[a, b] * slope(motion, j, local * b + c) * motion.jump[c]
+                if a >= moving:
+                    twist[a] += slope(motion, j, local * a + c) * motion.jump[c]
         for i in range(count):
             right[i] = lift_rate(motion, j, i) - signs[i] * twist[motion.contacts[i, ContactColumn.COORDINATE]]
             for k in range(count):
@@ -239,7 +242,7 @@ def perturb(motion, j, step):
         motion.pulls[i] += step * motion.pull_slopes[j, i]
     for k in range(local * local + count * count):
         numbers[k] += step * slope(motion, j, k)
-    invert(numbers, local, motion.block, motion.inverse)
+    invert(numbers, local, motion.first_order, motion.block, motion.inverse)
     for i in range(count):
         for k in range(count):
             entry = motion.inverse[motion.contacts[i, ContactColumn.COORDINATE], motion.contacts[k, ContactColumn.COORDINATE]]
@@ -313,14 +316,16 @@ def fall_back(motion, t, closed, j):
         motion.shifts[j] = math.copysign(1.0, sign)
         fill_slopes(motion)
         motion.shifts[j] = 0.0
-        for a in range(local):
+        for a in range(local - motion.first_order):
             for b in range(local):
                 for c in range(local):
                     lost[a] += sign * motion.inverse[a, b] * slope(motion, j, local * b + c) * fallen[c]
     for a in range(own):
         u[a], z[a] = after[a], rates[a] - lost[a]
         if a >= own - motion.first_order:
-            u[a] -= lost[a]
+            u[a] = given[a] - lost[a]
+    if motion.first_order > 0:  # rates of dependent sums
+        expand(motion, t, 1.0, 0)
     for i in range(count):
         right[i] = lift_rate(motion, j, i)
     project(motion, closed, z)

@@ -54,10 +54,13 @@ def columns_at_event(motion, kind, detail, t, side):
 def expand(motion, t, side, order):
     """Expand the state in its Taylor series at time `t`; returns the size of the model's own part of the state.
 
-    The velocities of coordinates of first order follow from the state, and are put into it.
+    The velocities of coordinates of first order follow from the state, and are put into it; as their accelerations are
+    derivatives of these, they need order 1 at least.
     """
     q, v, a, size = motion.coordinate_series, motion.velocity_series, motion.acceleration_series, 0.0
     g, m, w = motion.gap_series, motion.margin_series, motion.recurrences
+    if motion.first_order > 0:
+        order = max(order, 1)
     for i in range(motion.dof):
         q[i, 0], v[i, 0] = motion.coordinates[i], motion.velocities[i]
         if i < motion.own - motion.first_order:

@@ -50,7 +50,7 @@ class EnsembleResult:
     @property
     def last(self) -> np.ndarray:
         """The states at the end, coordinates and then velocities, (n, d)."""
-        own = len(self.system.model.coordinates)
+        own = len(self.system.in_gap_coordinates.model.coordinates)
         states = np.concatenate([self.ends.states[:, :own], self.ends.states[:, self.rows : self.rows + own]], axis=1)
         return self._in_own_coordinates(self.time, states)
 
@@ -125,14 +125,14 @@ class EnsembleResult:
         samples[np.arange(kept)[None, :] < (kept - done)[:, None]] = np.nan
         found, column = {}, 0
         for kind in (kind for kind in Sample if kind in self.options.sample):
-            width = len(kind.columns(len(self.system.model.coordinates)))
+            width = len(kind.columns(len(self.system.in_gap_coordinates.model.coordinates)))
             found[kind] = samples[:, :, column : column + width]
             column += width
         if Sample.STATE in found and self.system.in_gap_coordinates is not self.system:
             length, begun = self.jobs.rows["period_length"], self.jobs.rows["first_period"]
-            for i, back in enumerate(range(kept - 1, -1, -1)):
-                whole = (begun + done - back) * length + self.jobs.rows["start_time"]
-                found[Sample.STATE][:, i] = self._in_own_coordinates(whole if back else self.time, found[Sample.STATE][:, i])
+            whole = [(begun + done - back) * length + self.jobs.rows["start_time"] for back in range(kept - 1, 0, -1)]
+            states = [self._in_own_coordinates(t, found[Sample.STATE][:, i]) for i, t in enumerate([*whole, self.time])]
+            found[Sample.STATE] = np.stack(states, axis=1)
         return found
 
     def extrema_later(self, periods: np.ndarray, kept: int) -> np.ndarray:
@@ -160,7 +160,7 @@ class EnsembleResult:
         moves with the margin.
         """
         paths = self.options.paths or ()
-        ends, own, rows = self.ends, len(self.system.model.coordinates), self.rows
+        ends, own, rows = self.ends, len(self.system.in_gap_coordinates.model.coordinates), self.rows
         q = ends.states[:, own:rows].reshape(-1, 2 * own + len(paths), own)
         v = ends.states[:, rows + own :].reshape(-1, 2 * own + len(paths), own)
         derivatives = np.concatenate([q, v], axis=2).transpose(0, 2, 1).copy()
@@ -168,12 +168,13 @@ class EnsembleResult:
         if (inner := self.system.in_gap_coordinates) is not self.system:  # their derivatives to parameters are not asked for
             twin = self.inputs.with_numbers(inner)
             model, load, begin = twin.model, twin.load, list(self.inputs.values.values())
-            start = [np.broadcast_to(x, len(derivatives)) for x in begin[: 2 * own]]
+            given = len(self.system.model.coordinates)
+            start = [np.broadcast_to(x, len(derivatives)) for x in begin[: 2 * given]]
             here = ends.states[:, :own].T, ends.states[:, rows : rows + own].T
-            into = state_slopes(model.gap_values, self.inputs.values["time"], (start[:own], start[own:]), load)
+            into = state_slopes(model.gap_values, self.inputs.values["time"], (start[:given], start[given:]), load)
             derivatives = state_slopes(model.own_values, self.time, here, load) @ derivatives @ into
             bent = model.own_values(self.time, load, *([*x] if own > 1 else x[0] for x in (*here, rates.T)))[2]
-            rates = np.column_stack(np.broadcast_arrays(self.time, *(bent if own > 1 else [bent])))[:, 1:]
+            rates, own = np.column_stack(np.broadcast_arrays(self.time, *(bent if given > 1 else [bent])))[:, 1:], given
         slope = np.concatenate([self.last[:, own:], rates], axis=1)
         limited = ends.rows["status"] == Status.LIMITED
         with np.errstate(invalid="ignore"):  # the instant at which a margin is reached without speed has no derivative

@@ -133,6 +133,7 @@ class LaneSizes(NamedTuple):
     local: int  # the first of these, on which impacts act
     first_order: int  # how many of these, the last ones, are of first order
     jumps: int  # whether those jump at impacts
+    dependent: int  # how many of these are sums of the others, on which contacts act
     rows: int  # those of the tangent's columns included
     columns: int  # of the tangent
     margins: int

@@ -277,6 +277,7 @@ class Lanes:
             local=sizes.local,
             first_order=sizes.first_order,
             jumps=int(any(jump.op != "coordinate" for jump in trace.jumps)),
+            dependent=trace.dependent,
             rows=sizes.dof,
             columns=sizes.columns,
             margins=sizes.stops,

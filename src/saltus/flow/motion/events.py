@@ -218,11 +218,12 @@ class ContactEvents(MotionEvents):
 
     def in_own_coordinates(self, system: System) -> ContactEvents:
         """The events with velocities of a system's own coordinates, from those of `system.in_gap_coordinates`."""
-        values = self._values.copy()
-        for i in (1, 1 + self._own):  # before and after
-            velocity = self._values[:, i : i + self._own].T
-            places = self._places.T if self._places.size else velocity
-            values[:, i : i + self._own] = system.from_gaps(self.times, places, velocity)[1].T
+        before, after, impulses = self._parts(slice(None))
+        led = [
+            system.from_gaps(self.times, self._places.T if self._places.size else velocity.T, velocity.T)[1].T
+            for velocity in (before, after)
+        ]
+        values = np.concatenate([self._values[:, :1], *led, impulses], axis=1)
         return ContactEvents(self._length, self._labels, values, (self._contacts, self._frictions), self._places)
 
     def _called(self, bits: int) -> str:

@@ -15,11 +15,11 @@ from saltus.flow.kernel.compiled import Program
 from saltus.flow.kernel.layout import GrazingDetail, RestDetail
 from saltus.flow.motion.events import EventKind, Stop
 from saltus.flow.motion.motion import Motion, in_own_coordinates, state_names
-from saltus.flow.motion.simulate import Followed, MotionRequest, follow
+from saltus.flow.motion.simulate import MotionRequest, follow
 from saltus.flow.motion.validity import DenseOutput
 from saltus.progress import Progress, silent
 from saltus.result import Result, result_dataset
-from saltus.systems import System, check_system, constrained_acceleration, substitute
+from saltus.systems import System, check_system, solved_motion, substitute
 from saltus.taylor import FREQUENCY
 
 if TYPE_CHECKING:
@@ -127,7 +127,7 @@ class Sensitivities(Result):
         if inner.any():
             assert self.tangent is not None
             rates = self.tangent.states(wanted[inner])[:2]
-            own = len(motion.system.model.coordinates)
+            own = len(motion.system.in_gap_coordinates.model.coordinates)
             columns = np.concatenate([x.reshape(-1, own, x.shape[1]) for x in rates], axis=1).transpose(2, 1, 0)
             start = motion._states(np.array([motion.start]))[:2]
             found[inner] = OwnColumns(motion.system, self.parameter_paths, motion.start, start).later(
@@ -230,14 +230,15 @@ def sensitivities(
 def derivatives_of(request: MotionRequest, run: Program | None, progress: Progress = silent) -> Sensitivities:
     """`sensitivities` of a request, with its program if that is known."""
     followed, paths = follow(request, progress, run), request.sensitivities or ()
-    motion, n = followed.motion, len(request.system.model.coordinates)
-    shift, rates, at_end = _end_shift(followed, paths, request.periods), state_rates(motion), followed.columns
+    motion, n = followed.motion, len(request.given.model.coordinates)
+    rates, at_end = state_rates(motion), followed.columns
     seen, event_times = in_own_coordinates(request.given, motion), followed.shifts
     if seen is not motion:
         start = request.given.from_gaps(request.time, *np.split(request.start, 2))
         own = OwnColumns(request.given, paths, request.time, [x[:, None] for x in start])
         at_end, event_times = own.later(np.array([motion.time]), seen, at_end[None])[0], own.of_start(event_times)
         rates = own.rates(motion.time, motion.position, rates)
+    shift = _end_shift(motion, event_times, paths, request.periods)
     columns = at_end + np.outer(rates, shift) if shift.any() else at_end
     return Sensitivities(
         motion=seen,
@@ -268,7 +269,7 @@ class OwnColumns:
 
     def of_start(self, columns: np.ndarray) -> np.ndarray:
         """Columns (..., 2 n + parameters) along the own state at the start and along parameters at this fixed state."""
-        model, load, n = self._model, self.system.load, len(self.start[0])
+        model, load, n = self._model, self.system.load, len(self._model.coordinates)
         into, first = state_slopes(model.gap_values, self.time, self.start, load)[0], columns[..., : 2 * n]
         moved = first @ self._by_numbers("gap_values", self.time, *self.start)[0]
         return np.concatenate([first @ into, columns[..., 2 * n :] + moved], axis=-1)
@@ -281,7 +282,7 @@ class OwnColumns:
         inner = self.system.to_gaps(times, position, velocity)
         out = state_slopes(self._model.own_values, times, inner, self.system.load)
         found = out @ self.of_start(columns)
-        found[..., out.shape[-1] :] += self._by_numbers("own_values", times, *inner)
+        found[..., out.shape[-2] :] += self._by_numbers("own_values", times, *inner)
         return np.asarray(found)
 
     def rates(self, time: float, position: Any, rates: np.ndarray) -> np.ndarray:
@@ -294,8 +295,9 @@ class OwnColumns:
         return self.system.in_gap_coordinates.model
 
     def _by_numbers(self, method: str, times: Any, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """The derivatives of `own_values` or `in_gaps` to the parameters, (m, 2 n, parameters), at complex numbers."""
-        step, found = 1e-100, np.zeros((position.shape[1], 2 * len(position), len(self.paths)))
+        """The derivatives of `own_values` or `gap_values` to the parameters, (m, 2 n, parameters), at complex numbers."""
+        size = len((self.system.model if method == "own_values" else self._model).coordinates)
+        step, found = 1e-100, np.zeros((position.shape[1], 2 * size, len(self.paths)))
         for j, path in enumerate(self.paths):
             chosen = {path: 1j * step}
             twin = substitute(self.system.in_gap_coordinates, lambda at, x, by=chosen: x + by[at] if at in by else x)  # type: ignore[misc]
@@ -309,16 +311,16 @@ class OwnColumns:
 
 def state_slopes(lead: Any, times: Any, states: Sequence[Any], load: Any) -> np.ndarray:
     """The derivatives, at complex numbers, of the states that `lead` makes, `own_values` or `gap_values`, to the states that it
-    is given: coordinates and velocities of m motions, (n, m) each; (m, 2 n, 2 n)."""
+    is given: coordinates and velocities of m motions, (n, m) each; (m, 2 c, 2 n) for c coordinates that `lead` returns."""
     state, step, n = np.array([*states[0], *states[1]], dtype=complex), 1e-100, len(states[0])
-    found = np.empty((state.shape[1], 2 * n, 2 * n))
+    found = []
     for j in range(2 * n):
         beside = state.copy()
         beside[j] += 1j * step
         changed = lead(times, load, *(tuple(half) if n > 1 else half[0] for half in np.split(beside, 2)))
         values = [x for part in changed for x in (part if isinstance(part, tuple) else (part,))]
-        found[:, :, j] = np.stack([np.imag(x) / step * np.ones(len(found)) for x in values], axis=1)
-    return found
+        found.append(np.stack([np.imag(x) / step * np.ones(state.shape[1]) for x in values], axis=1))
+    return np.stack(found, axis=-1)
 
 
 def _end_of(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
@@ -328,19 +330,19 @@ def _end_of(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
 
 def _paths(system: System, parameters: Iterable[str]) -> tuple[str, ...]:
     """The checked paths of the parameters to differentiate to."""
-    check_system(system, "sensitivities", several_contacts=True)
+    check_system(system, "sensitivities", several_contacts=True, dependent=True)
     return check_names("parameters", parameters, "parameters, such as ['load.frequency']")
 
 
-def _end_shift(followed: Followed, paths: tuple[str, ...], periods: float | None) -> np.ndarray:
+def _end_shift(motion: Motion, event_times: np.ndarray, paths: tuple[str, ...], periods: float | None) -> np.ndarray:
     """The shift of the time at the end along each column: with the margin that ends the motion, or with the forcing period."""
-    motion, shift = followed.motion, np.zeros(followed.columns.shape[1])
+    shift = np.zeros(event_times.shape[1])
     if motion.stop is Stop.LIMIT:
-        return np.asarray(followed.shifts[-1])
+        return np.asarray(event_times[-1])
     if periods is not None and FREQUENCY in paths:
         frequency = motion.system.load.frequency
         assert frequency is not None
-        shift[followed.columns.shape[0] + paths.index(FREQUENCY)] = -2.0 * math.pi * periods / frequency**2
+        shift[shift.size - len(paths) + paths.index(FREQUENCY)] = -2.0 * math.pi * periods / frequency**2
     return shift
 
 
@@ -357,7 +359,7 @@ def state_rates(motion: Motion) -> np.ndarray:
         slides = [*motion.sliding.values(), *above]
         held |= {friction.coordinate for friction, s in zip(system.model.frictions, slides, strict=False) if s == 0}
         free, q = [float(name not in held) for name in system.model.coordinates], motion.position
-        acceleration = constrained_acceleration(system.model, motion.time, q, motion.velocity, system.load, free, slides)
+        acceleration = solved_motion(system.model, motion.time, q, motion.velocity, system.load, free, slides).acceleration
     else:
         acceleration = system.model.acceleration(motion.time, motion.position, motion.velocity, float(side), system.load)
     return np.concatenate([velocity, np.atleast_1d(np.asarray(acceleration, dtype=float))])

@@ -1,0 +1,158 @@
+"""Which coordinates of a model the sums take the place of that its contacts, surfaces and frictions keep.
+
+A sum that follows from those before it takes no place, and is a further coordinate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from saltus.errors import ParameterError
+from saltus.systems.contact_model import Contact, Friction, Surface
+from saltus.systems.model import is_function, is_zero, reads_of
+
+Part = Contact | Surface | Friction
+INVERSE, TURNS = "_inverse", " turns"  # behind the name of a model's function, its inverse, and the margin that ends this
+
+
+@dataclass(frozen=True)
+class GapPlaces:
+    """Which coordinates the gaps of a model take the place of."""
+
+    names: tuple[str, ...]  # of the coordinates, in which the sum of a gap has the place of one of its terms; then dependent sums
+    order: tuple[int, ...]  # the places of sums, in the order in which their terms are eliminated
+    contacts: tuple[tuple[int, int], ...]  # the place of each contact's sum, and +1, or -1 if the coordinate is minus the sum
+    surfaces: tuple[tuple[int, int], ...]  # of each surface likewise
+    frictions: tuple[tuple[int, int], ...]  # and of each friction
+    solved: tuple[tuple[int, tuple[str, ...]], ...]  # the coordinates in the order of solving, with the functions that each needs
+    stands: tuple[tuple[int, str], ...]  # places of coordinates, with the functions of them alone that stand for them
+
+
+def terms_of(contact: Part) -> dict[str, Any]:
+    """The coefficients of the coordinates and load channels in the sum that a contact keeps on one side of its position."""
+    return {contact.coordinate: 1.0} if isinstance(contact.coordinate, str) else dict(contact.coordinate)
+
+
+def places_of(model: Any) -> GapPlaces | None:
+    """Which coordinates the sums of a model's contacts take the place of; None if each contact holds a single coordinate.
+
+    Functions that stand for the coordinate on which they depend are tried only if there is no other way.
+    """
+    parts: tuple[Part, ...] = (*model.contacts, *model.surfaces, *model.frictions)
+    if all(isinstance(part.coordinate, str) for part in parts):
+        return None
+    reads = {name: reads_of(model, name) for part in parts for name in terms_of(part) if is_function(model, name)}
+    found = _placed(model, parts, reads, {})
+    stands = {places[0]: name for name, places in reads.items() if len(places) == 1 and hasattr(model, name + INVERSE)}
+    if isinstance(found, str) and stands:
+        found = _placed(model, parts, reads, stands)
+    if isinstance(found, str):
+        raise ParameterError(found, "model")
+    return found
+
+
+def _placed(model: Any, parts: Sequence[Part], reads: dict[str, tuple[int, ...]], stands: dict[int, str]) -> GapPlaces | str:
+    """The places of sums, or why there are none. Each takes that of the coordinate with the largest coefficient, of several the
+    last, after the elimination of earlier sums, which none of its functions reads and which no part holds alone."""
+    names = columns_of(model.coordinates, tuple(stands.items()))
+    columns = [*names, *(name for name in reads if name not in names)]
+    called, found, order = list(names), dict[int, tuple[int, int]](), list[int]()
+    alone = {part.coordinate for part in parts if isinstance(part.coordinate, str)}
+    rows = {names.index(name): {name: 1.0} for name in alone if name in names}
+    reduced = dict[int, list[Fraction]]()
+    for number, part in enumerate(parts):
+        terms = {name: float(factor) for name, factor in terms_of(part).items()}
+        turned = {name: -factor for name, factor in terms.items()}
+        same = [(place, 1 if terms == row else -1) for place, row in rows.items() if row in (terms, turned)]
+        if not same:
+            left = [Fraction(terms.get(name, 0.0)) for name in columns]
+            for place, row in reduced.items():
+                left = [a - left[place] * b for a, b in zip(left, row, strict=True)]
+            read = {place for name in columns[len(names) :] if left[columns.index(name)] for place in reads[name]}
+            free = [place for place in range(len(names)) if left[place] and place not in rows and place not in read]
+            follows = not (free or reads or model.frictions or hasattr(model, "mode_equations"))
+            if not (free or follows) or any(name in model.coordinates and name not in names for name in terms):
+                return _no_place(part, parts, reads)
+            if follows:
+                place = len(called)
+                called.append(_called(part))
+            else:
+                place = max(free, key=lambda place: (abs(left[place]), place))
+                reduced[place], called[place] = [a / left[place] for a in left], _called(part)
+                order.append(place)
+            rows[place], same = terms, [(place, 1)]
+        found[number] = same[0]
+    solved = _order_of_solving(names, [rows.get(place, {name: 1.0}) for place, name in enumerate(names)], order, reads)
+    if solved is None:
+        return _no_place(parts[-1], parts, reads)
+    count, every = len(model.contacts), tuple(found.values())
+    last = count + len(model.surfaces)
+    return GapPlaces(tuple(called), tuple(order), every[:count], every[count:last], every[last:], solved, tuple(stands.items()))
+
+
+def _order_of_solving(
+    names: Sequence[str], rows: list[dict[str, float]], order: Sequence[int], reads: dict[str, tuple[int, ...]]
+) -> tuple[tuple[int, tuple[str, ...]], ...] | None:
+    """The coordinates in an order in which each follows from sums and from functions of those before it, or None."""
+    back = inverse([[Fraction(row.get(name, 0.0)) for name in names] for row in rows], order, Fraction(1))
+    shares = [{f: sum(t * Fraction(row.get(f, 0.0)) for t, row in zip(ts, rows, strict=True)) for f in reads} for ts in back]
+    needed = [tuple(f for f, share in each.items() if share and f not in names) for each in shares]
+    found, left = list[tuple[int, tuple[str, ...]]](), list(range(len(names)))
+    while left:
+        known = {place for place, _ in found}
+        ready = [place for place in left if all(known.issuperset(reads[f]) for f in needed[place])]
+        if not ready:
+            return None
+        found.append((ready[0], needed[ready[0]]))
+        left.remove(ready[0])
+    return tuple(found)
+
+
+def columns_of(names: Sequence[str], stands: Any) -> list[str]:
+    """The coordinates, and in the places of some of them the functions that stand for them."""
+    return [dict(stands).get(place, name) for place, name in enumerate(names)]
+
+
+def _no_place(part: Part, parts: Sequence[Part], reads: dict[str, tuple[int, ...]]) -> str:
+    """Why a part's sum cannot be a coordinate, in words."""
+    others = ", ".join(other.name for other in parts if other is not part)
+    kept, names = _called(part), [name for name in terms_of(part) if name in reads]
+    what = f"the {type(part).__name__.lower()} {part.name!r} keeps {kept}"
+    if names:
+        return (
+            f"{what}, and needs a coordinate of its own, with a constant coefficient and read by none of its functions: let it "
+            f"keep a coordinate where its gap is 0, or, if {names[0]} is of one coordinate alone, give the model "
+            f"{names[0]}{INVERSE}(value), the coordinate at which {names[0]} has this value"
+        )
+    return (
+        f"{what}, which follows from what {others} keep, up to a displacement: beside frictions, and in a Structure, each sum "
+        "must be a coordinate of its own; leave one out, or give sums that are the same the same coefficients"
+    )
+
+
+def _called(contact: Part) -> str:
+    """The name of a contact's sum, such as y_minus_x; with other coefficients than 1 and -1 it is called after the contact."""
+    terms = {name: float(factor) for name, factor in terms_of(contact).items()}
+    if any(abs(factor) != 1.0 for factor in terms.values()):
+        return f"sum_at_{contact.name}"
+    ranked = sorted(terms, key=lambda name: terms[name] < 0.0)  # positive terms first
+    return "_".join(("minus_" if terms[name] < 0.0 else "plus_") + name for name in ranked).removeprefix("plus_")
+
+
+def inverse(rows: list[list[Any]], order: Sequence[int], one: Any = 1.0) -> list[list[Any]]:
+    """The inverse of a matrix whose rows are those of the unit matrix, except for those in `order`."""
+    size = len(rows)
+    left, right = [list(row) for row in rows], [[one * (i == j) for j in range(size)] for i in range(size)]
+    for k in (*order, *(k for k in range(size) if k not in order)):
+        pivot = left[k][k]
+        if not (isinstance(pivot, float) and pivot == 1.0):
+            left[k], right[k] = [x / pivot for x in left[k]], [x if is_zero(x) else x / pivot for x in right[k]]
+        for i in range(size):
+            factor = left[i][k]
+            if i != k and not is_zero(factor):
+                left[i] = [x if is_zero(y) else x - factor * y for x, y in zip(left[i], left[k], strict=True)]
+                right[i] = [x if is_zero(y) else x - factor * y for x, y in zip(right[i], right[k], strict=True)]
+    return right
