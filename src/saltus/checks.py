@@ -91,10 +91,8 @@ def number_problem(
         and (at_least is None or value >= at_least)
         and (at_most is None or value <= at_most)
     )
-    if inside and abs(float(value)) > LIMITS.value:
-        return f"must be at most {LIMITS.value:g} in size, got {shown(value)}"
     if inside:
-        return None
+        return None if abs(float(value)) <= LIMITS.value else f"must be at most {LIMITS.value:g} in size, got {shown(value)}"
     wanted = _range_text(above, below, at_least, at_most) + (f" {unit}" if unit else "")
     if not number:
         kind = wanted.replace("lie in", "be a number in").replace("be finite", "be a finite number")

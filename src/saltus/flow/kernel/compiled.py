@@ -134,8 +134,7 @@ def _load_fillers() -> tuple[Callable[..., None], Callable[..., None]]:
 
 @cache
 def load_kernel() -> Callable[..., int]:
-    """The kernel of models with at most one contact, `advance` of `kernel/loop.py`, called without numba's dispatch on argument
-    types."""
+    """The kernel of models with at most one contact, `advance` of `kernel/loop.py`, called without numba's dispatch on types."""
     return entry_point(kernel_module().advance)
 
 
@@ -163,8 +162,7 @@ def contacts_module() -> ModuleType:
 def contacts_text() -> str:
     """The source of the kernel of models with several contacts."""
     parts = (contact_layout, complementarity, contact_impacts, tangent, rubbing, frictions, closings)
-    text = kernel_text(layout, roots, steps, *parts, contacts_kernel, loop)
-    return text.replace("(ADVANCE)", "(ADVANCE_CONTACTS)")
+    return kernel_text(layout, roots, steps, *parts, contacts_kernel, loop).replace("(ADVANCE)", "(ADVANCE_CONTACTS)")
 
 
 def kernel_text(*modules: ModuleType) -> str:
@@ -311,8 +309,8 @@ def _matrix_slopes(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
 
 def _at_impact(name: str, arguments: tuple[str, ...], roots: list[Expr], known: dict[Expr, int]) -> WrittenFunction:
     """A function that returns the values of expressions at an instant, for the velocity `v0`."""
-    places = Places(arguments, LEAVES | {"velocity": ("v0", 0)})
-    return _function(name, places, [Case(tape(roots, known), [None] * len(roots))])
+    case = Case(tape(roots, known), [None] * len(roots))
+    return _function(name, Places(arguments, LEAVES | {"velocity": ("v0", 0)}), [case])
 
 
 def _tangent(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
