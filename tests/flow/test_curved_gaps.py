@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import saltus
-from saltus import Contact, ContactModel, Friction, Load, NewtonImpact, System
+from saltus import Contact, ContactModel, Friction, Load, NewtonImpact, Surface, System
 from saltus.flow import sensitivities, simulate, simulate_many
 
 
@@ -340,6 +340,42 @@ def test_a_body_in_a_valley_that_shakes_swings_at_half_the_frequency():
     np.testing.assert_allclose(sizes, [0.0, 0.0, *2 * [math.exp(-0.1 * 2.0 * math.pi)]], rtol=0, atol=1e-9)
     verdict = saltus.classify(system, x=0.3, y=2.0)
     assert (str(verdict.kind), verdict.period) == ("periodic", 2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class OverSoftGround(ContactModel):
+    """A body over curved ground that gives way, with the stiffness k along its height over it."""
+
+    stiffness: float = 30.0
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x", "y")
+    surfaces: ClassVar[tuple[Surface, ...]] = (Surface(name="ground", coordinate={"y": 1.0, "valley": -1.0}),)
+
+    def valley(self, q):
+        return 0.3 * (1.0 - np.cos(q[0]))
+
+    def force(self, t, q, velocity, load, sides):
+        pressed = 0.5 * (1.0 - sides.ground) * self.stiffness * (self.valley(q) - q[1])
+        return -0.3 * np.sin(q[0]) * pressed, pressed - 1.0
+
+
+def test_a_surface_may_be_curved():
+    motion = simulate(System(model=OverSoftGround()), x=0.8, y=0.9, velocity=(0.3, 0.0), duration=8.0)
+
+    def rate(t, s):
+        push = 30.0 * max(0.3 * (1.0 - math.cos(s[0])) - s[1], 0.0)
+        return [s[2], s[3], -0.3 * math.sin(s[0]) * push, push - 1.0]
+
+    def crosses(t, s):
+        return s[1] - 0.3 * (1.0 - math.cos(s[0]))
+
+    crosses.terminal, t, state, crossings = True, 0.0, np.array([0.8, 0.9, 0.3, 0.0]), 0
+    while t < 8.0:
+        begin = solve_ivp(rate, (t, t + 1e-3), state, method="DOP853", rtol=2e-13, atol=1e-14)  # past the surface
+        run = solve_ivp(rate, (t + 1e-3, 8.0), begin.y[:, -1], method="DOP853", rtol=2e-13, atol=1e-14, events=crosses)
+        t, state, crossings = run.t[-1], run.y[:, -1], crossings + run.status
+    assert len(motion.events) == crossings > 4
+    np.testing.assert_allclose(motion.final_state, state, rtol=0, atol=1e-10)
 
 
 # --- walls that move, and mass matrices that depend on the coordinate they move ------------------------------------------------
