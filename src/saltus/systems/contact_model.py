@@ -219,7 +219,7 @@ class ContactModel(Model):
 
     1. `force`, r(t, q, v); its accelerations follow from it;
     2. `mass_matrix`, M(q), symmetric and positive definite, where that is not the identity;
-    3. `contacts`, a tuple of `Contact`, each of which keeps one coordinate, or a sum of several, on one side of a position. While
+    3. `contacts`, a tuple of `Contact`, each of which keeps one coordinate, or a sum, on one side of a position. While
        a contact is closed it holds it as long as its reaction presses; impacts follow the system's law (`NewtonImpact`);
     4. `frictions`, a tuple of `Friction`, and their `normal_forces` N(t, q, v), by default 1, of those that are in no contact.
        A friction that sticks holds the velocity of its coordinate, or of a sum of several;

@@ -193,6 +193,10 @@ class InGapCoordinates(ContactModel):
     def gap_states(self, t: Any, position: Any, velocity: Any, load: Any) -> tuple[np.ndarray, np.ndarray]:
         """The inverse of `own_states`, in which what contacts hold up to rounding is held exactly."""
         places, rates = self.gap_values(t, load, _values(position), _values(velocity))
+        for place, name in self.gap_places.stands:
+            there, back = (self._each(x, True)[place] for x in (_values(position), self.own_values(t, load, places)[0]))
+            if not np.all(np.abs(back - there) < 1e-6):
+                raise ParameterError(f"a state lies beyond where {name}{TURNS}, as its {name}{INVERSE} leads elsewhere", name)
         return self.closed_exactly(*np.split(_stacked([*self._each(places), *self._each(rates)]), 2))
 
     def closed_exactly(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
