@@ -272,7 +272,8 @@ class PeriodicOrbit(Result):
 
     @cached_property
     def multipliers(self) -> np.ndarray:
-        """The Floquet multipliers, by falling modulus, complex: two for a coordinate, one for a coordinate of first order."""
+        """The Floquet multipliers, by falling modulus, complex: two for a coordinate, one for a coordinate of first order; and
+        one more, which is 0, for an orbit that is followed from event to event of several contacts."""
         chain, following = self.solution.evaluation.monodromy(), self.equations.following
         chain = np.delete(np.delete(chain, following, axis=0), following, axis=1)
         if not np.isfinite(chain).all():
