@@ -12,6 +12,8 @@ from scipy.integrate import solve_ivp
 import saltus
 from saltus import Contact, ContactModel, Friction, Load, NewtonImpact, Surface, System
 from saltus.flow import sensitivities, simulate, simulate_many
+from saltus.systems.model import SLOPES, Jet
+from saltus.taylor.rules import FUNCTIONS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -483,3 +485,23 @@ REFUSED = {
 def test_gaps_without_meaning_are_refused_when_the_system_is_made(sentence):
     with pytest.raises(saltus.ParameterError, match=sentence):
         System(model=block_with(**REFUSED[sentence]))
+
+
+# --- derivatives along curves ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", SLOPES)
+def test_first_and_second_derivatives_along_a_curve_are_those_of_differences(name):
+    function, at = getattr(np, name), [lambda s: 0.7 + 0.4 * s - 0.3 * s**2, lambda s: 1.9 - 0.6 * s + 0.2 * s**2]
+    jets = [Jet(0.7, 0.4, -0.6), Jet(1.9, -0.6, 0.4)][: function.nin]
+    found = function(*jets)
+    beside = [float(function(*(curve(s) for curve in at[: function.nin]))) for s in np.array([-2, -1, 0, 1, 2]) * 1e-2]
+    first = np.dot([1, -8, 0, 8, -1], beside) / 0.12
+    second = np.dot([-1, 16, -30, 16, -1], beside) / 12e-4
+    np.testing.assert_allclose([found.value, found.first, found.second], [beside[2], first, second], rtol=1e-6, atol=1e-7)
+
+
+def test_slopes_are_those_of_the_traced_functions():
+    for function in FUNCTIONS.values():
+        y = function.numpy(0.37)
+        assert SLOPES[function.numpy.__name__][0](0.37, y) == pytest.approx(function.slope(0.37, y), rel=1e-15)
