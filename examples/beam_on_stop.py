@@ -48,10 +48,10 @@ touched = brentq(lambda frequency: abs(linear(frequency)) - 1.0, 1.0, 1.2, xtol=
 branch = saltus.continue_orbit(saltus.find_orbit(soft, **soft.model.start()), "load.frequency", (0.93, 1.18))
 folds = [point.parameter for point in branch.special if point.kind == "LP"]
 errors = np.abs([np.subtract([fold(n, -1.0, (2.3, 2.6)), fold(n, 1.0, (1.001, 1.1))], folds) for n in (3, 7, 15)])
-figure, axes = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+values, (figure, axes) = np.linspace(0.96, 1.18, 12), plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
 saltus.plot(branch, ax=axes[0])
 for ax, system, name, falls in ((axes[0], soft, "soft stop", folds[1]), (axes[1], hard, "hard stop", touched)):
-    sweep = saltus.frequency_sweep(system, np.linspace(0.96, 1.18, 12), periods=80, stop_early=False, **system.model.start())
+    sweep = saltus.frequency_sweep(system, values, periods=80, stop_early=False, max_period=1, **system.model.start())
     ax.plot(sweep.value, sweep.amplitude.T, "o", fillstyle="none", label=["swept up", "swept down"])
     ax.set(xlabel="frequency / first of the beam", ylabel="amplitude of the tip", title=name)
     ax.legend()
