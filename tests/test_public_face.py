@@ -245,6 +245,7 @@ def good(made):
         "Measurement.sigma_of": (made["record"].sigma_of, {"quantity": "theta"}),
         "Metainterface": (model, {"beta0": 1.4}),
         "Motion.at": (made["motion"].at, {"times": 1.0}),
+        "Motion.extrema_between": (made["motion"].extrema_between, {"times": [0.0, 1.0]}),
         "Motion.samples": (made["motion"].samples, {"count": 10}),
         "Motion.to_pandas": (made["motion"].to_pandas, {}),
         "Motion.to_xarray": (made["motion"].to_xarray, {}),

@@ -594,4 +594,8 @@ def test_extrema_of_forcing_periods_are_those_of_many_samples_of_the_own_coordin
     np.testing.assert_allclose(found, expected, rtol=0, atol=2e-6)  # acceleration times (period / 4000)^2 / 8
     assert (found[:, :, 0] <= expected[:, :, 0] + 1e-15).all()
     assert (found[:, :, 1] >= expected[:, :, 1] - 1e-15).all()
+    at_once = motion.extrema_between([2.0, 2.0])
+    np.testing.assert_array_equal(at_once[0, :, 0], motion.at(2.0)[0])
+    with pytest.raises(saltus.ParameterError, match=r"times must be at least two in ascending order, got \[2.0, 1.0\]"):
+        motion.extrema_between([2.0, 1.0])
     assert np.array_equal(motion.extrema, np.stack([found[:, :, 0].min(axis=0), found[:, :, 1].max(axis=0)], axis=1))

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from saltus.checks import Numbers, check_count, instants
-from saltus.errors import ParameterError, near
+from saltus.errors import ParameterError, near, shown
 from saltus.flow.motion.events import EventKind, Impacts, MotionEvents, Stop, masks_of, modes_of, type_of_bits
 from saltus.flow.motion.validity import DenseOutput, Validity, ValidityCheck
 from saltus.progress import html_table
@@ -100,13 +100,6 @@ class Motion(Result):
     dense: DenseOutput | None
     kept: Samples | None
     sampled_validity: Validity | None
-
-    @classmethod
-    def of_fields(cls, **fields: Any) -> Self:
-        """A motion of all its fields. What a frozen dataclass does to set them one by one takes longer than a short motion."""
-        motion = object.__new__(cls)
-        vars(motion).update(fields)
-        return motion
 
     def __getattr__(self, name: str) -> Any:
         known = () if name.startswith("_") or name == "system" else self.system.model.coordinates
@@ -232,12 +225,12 @@ class Motion(Result):
         found: np.ndarray = self.extrema_between(np.array([self.start, self.time]))[0]
         return found
 
-    def extrema_between(self, bounds: np.ndarray) -> np.ndarray:
+    def extrema_between(self, times: Numbers) -> np.ndarray:
         """The least and the largest value of each coordinate between every two neighbours of times in ascending order.
 
         Parameters
         ----------
-        bounds
+        times
             Dimensionless times of the motion, (n,).
 
         Returns
@@ -248,18 +241,21 @@ class Motion(Result):
         Raises
         ------
         ParameterError
-            A time lies outside the motion, or the motion was computed with dense=False.
+            A time lies outside the motion, the times do not ascend, or the motion was computed with dense=False.
         """
+        bounds = instants(times)
+        if len(bounds) < 2 or (np.diff(bounds) < 0.0).any():
+            raise ParameterError(f"times must be at least two in ascending order, got {shown(times)}", "times")
         self._check_times(bounds)
         steps = [] if self.dense is None else [self.dense.start, self.dense.start + self.dense.length]
         edges = np.unique(np.clip(np.concatenate([bounds, *steps]), bounds[0], bounds[-1]))
-        times = edges[:-1, None] + SHARES * np.diff(edges)[:, None]
-        position, velocity, _ = self._states(np.append(times.ravel(), bounds))
-        at_bounds, rate = position[:, times.size :].T, velocity[:, : times.size].reshape(-1, *times.shape)
+        seen = edges[:-1, None] + SHARES * np.diff(edges)[:, None]
+        position, velocity, _ = self._states(np.append(seen.ravel(), bounds))
+        at_bounds, rate = position[:, seen.size :].T, velocity[:, : seen.size].reshape(len(velocity), *seen.shape)
         place, step, sample = np.nonzero(rate[:, :, :-1] * rate[:, :, 1:] < 0.0)
-        turned = self._turned(place, times[step, sample], times[step, sample + 1])
+        turned = self._turned(place, seen[step, sample], seen[step, sample + 1])
         within = np.searchsorted(bounds, edges[:-1], side="right") - 1
-        inner = position[:, : times.size].reshape(rate.shape).transpose(1, 2, 0)
+        inner = position[:, : seen.size].reshape(rate.shape).transpose(1, 2, 0)
         found = []
         for extremum in (np.minimum, np.maximum):
             values = extremum(at_bounds[:-1], at_bounds[1:])
@@ -346,6 +342,13 @@ class Motion(Result):
             Dimensionless times, (n,).
         """
         return to_dataset(self, times)
+
+
+def motion_of(**fields: Any) -> Motion:
+    """A motion of all its fields. What a frozen dataclass does to set them one by one takes longer than a short motion."""
+    motion = object.__new__(Motion)
+    vars(motion).update(fields)
+    return motion
 
 
 def in_own_coordinates(system: System, motion: Motion) -> Motion:

@@ -15,7 +15,7 @@ from saltus.flow.kernel.compiled import Program, known_program, limits_of, taylo
 from saltus.flow.kernel.layout import Mode, Status
 from saltus.flow.motion.events import Stop
 from saltus.flow.motion.kernel_state import MOST, ContactState, KernelState, Recorder, time_of
-from saltus.flow.motion.motion import Motion, in_own_coordinates
+from saltus.flow.motion.motion import Motion, in_own_coordinates, motion_of
 from saltus.flow.motion.validity import DenseOutput
 from saltus.progress import Progress, silent
 from saltus.systems import System, check_system, friction_margins, read_start
@@ -427,7 +427,7 @@ def _collect(request: MotionRequest, now: KernelState, status: int, numbers: Any
     if status == Status.STALLED:
         stop, limit = Stop.SINGULAR, request.system.model.singularity  # `_refuse` lets no other motion stall
     samples = None if request.sample_times is None else recorder.samples(time, np.array(position), np.array(velocity), side)
-    return Motion.of_fields(
+    return motion_of(
         system=request.system,
         tol=request.tol,
         start=start,
