@@ -18,13 +18,12 @@ from saltus.systems.contact_model import (
     Friction,
     contact_of,
     held_entry,
-    is_zero,
     mass_rows,
     normal_forces,
 )
 from saltus.systems.gap_coordinates import in_gap_coordinates
 from saltus.systems.load import Load
-from saltus.systems.model import Model, OneContactModel
+from saltus.systems.model import Model, OneContactModel, is_zero
 
 
 class ImpactLaw:

@@ -72,7 +72,7 @@ def _packed(names: tuple[str, ...]) -> Struct:
 
 
 WHOLE_RECORD, AT_START = _packed(_NAMES), _packed(_NAMES[: _NAMES.index("tolerance") + 1])
-MotionNumbers: Any = namedtuple("MotionNumbers", _NAMES)  # a record as Python's numbers
+MotionNumbers: Any = namedtuple("MotionNumbers", _NAMES)  # type: ignore[misc]  # a record as Python's numbers
 
 
 @cache
