@@ -39,7 +39,7 @@ def test_the_models_table_is_that_of_the_classes():
     assert set(rows) == {name for name, cls in MODELS.items() if cls.__module__.startswith("saltus.")}
     for name, (_, needs, optional, channels, coordinates) in rows.items():
         model = MODELS[name]
-        following = ("coefficients", "form")  # of a structure, from its matrices
+        following = ("coefficients", "records", "form")  # of a structure, from its matrices
         named = re.findall(r"`(\w+)`", re.sub(r"\([^)]*\)", "", needs + optional))
         assert named == [f.name for f in dataclasses.fields(model) if f.name not in following]
         if not isinstance(vars(model).get("coordinates"), property):  # else their number is in the model's numbers

@@ -384,8 +384,8 @@ def _expanded(traced: Any) -> list[Expr]:
 
 
 def check_size(traced: Any, lanes: bool = False) -> None:
-    """Refuse equations whose compilation would take minutes or hours; the time grows as the square of the number of loops, or in
-    proportion to a quarter of it for equations that are compiled without LLVM's passes (`is_long`).
+    """Refuse equations whose compilation would take minutes or hours; the time grows as the square of the number of loops.
+    Without LLVM's passes (`is_long`) derivatives take half of it, and motions a time in proportion to a quarter of the number.
 
     Raises
     ------
@@ -395,7 +395,8 @@ def check_size(traced: Any, lanes: bool = False) -> None:
     expanded = _expanded(traced)
     loops, nodes = loop_count(expanded), len(ordered(expanded))
     size = max(loops / LIMITS.operations, nodes / LIMITS.nodes)
-    minutes = 0.25 * size if is_long(traced) and not lanes else size**2
+    without_passes = is_long(traced) and not lanes
+    minutes = size**2 if not without_passes else 0.5 * size**2 if traced.columns else 0.25 * size
     minutes *= (LIMITS.derivatives if traced.columns else 1.0) * (LIMITS.lanes if lanes else 1.0)
     most = LIMITS.compiling if traced.columns or lanes else 1.0
     if minutes > most:
