@@ -82,7 +82,8 @@ class Series:
         self._integrated = [*self.positions.values(), *kept]
         highest = max((row.degree for row in self.rows if row.degree is not None), default=0)
         self.written_out = 2 * (highest // 2 + 1)  # the number of orders whose code is written out
-        self._table = constant_table(self.builder, [1.0 / max(k, 1) for k in range(layout.capacity + 2)])
+        if not memory.arithmetic.exact:
+            self._table = constant_table(self.builder, [1.0 / max(k, 1) for k in range(layout.capacity + 2)])
 
     def _row(self, node: Node) -> Row:
         op = node[0]
@@ -295,10 +296,10 @@ class Series:
         """A number divided by coefficient 0 of a series."""
         if value is None:
             return None
+        if self.memory.arithmetic.exact:
+            return value / self.start(row)
         if id(row) not in self._inverses:
             self._inverses[id(row)] = 1.0 / self.start(row)
-        if self.memory.arithmetic.exact and self.ahead is None:
-            return value / self.start(row)
         return multiply(value, self._inverses[id(row)])
 
     def product(self, a: Row, b: Row, first: bool = True, last: bool = True) -> Coefficient:
@@ -325,11 +326,14 @@ class Series:
 
     def _divided(self, value: Coefficient, more: int) -> Coefficient:
         """A number divided by this order, or by a following one."""
+        exact = self.memory.arithmetic.exact
         if value is None or (self.ahead is None and self.order + more == 1):
             return value
         if self.ahead is None:
             k = self.order + more
-            return value / float(k) if self.memory.arithmetic.exact else multiply(1.0 / k, value)
+            return value / float(k) if exact else multiply(1.0 / k, value)
+        if exact:
+            return value / (self._number + float(self.ahead + more))
         index = self.builder.add(self.order, LONG(self.ahead + more))
         inverse = self.builder.load(self.builder.gep(self._table, [LONG(0), index]))
         return multiply(self.memory.arithmetic.everywhere(self.builder, inverse), value)

@@ -19,45 +19,41 @@ NOISE = 4.0 * 2.0**-52  # rounding of a Bernstein coefficient, relative to the s
 DEPTH = 64  # the most boxes on the stack; a bisection down to NARROW leaves one behind at each of 26 levels
 
 
-# Sums over even and over odd powers are made apart: the processor adds to one while it waits for the other.
-
-
 @jit
 def horner(c, n, x):
     """sum_{k=0..n} c[k] x^k."""
-    if n == 0:
-        return c[0]
-    square, first, second = x * x, c[n], c[n - 1]
-    for k in range(n - 2, 0, -2):
-        first, second = first * square + c[k], second * square + c[k - 1]
-    return second * x + (first * square + c[0]) if n % 2 == 0 else first * x + second
+    value = c[n]
+    for k in range(n - 1, -1, -1):
+        value = value * x + c[k]
+    return value
+
+
+@jit
+def horner_slope(c, n, x):
+    """The derivative of sum_{k=0..n} c[k] x^k."""
+    value = n * c[n]
+    for k in range(n - 1, 0, -1):
+        value = value * x + k * c[k]
+    return value
 
 
 @jit
 def value_and_slope(c, n, x):
     """sum_{k=0..n} c[k] x^k, n >= 1, and its derivative."""
-    square, even, odd, even_slope, odd_slope = x * x, c[n], c[n - 1], 0.0, 0.0
-    for k in range(n - 2, 0, -2):
-        even_slope, odd_slope = even_slope * square + even, odd_slope * square + odd
-        even, odd = even * square + c[k], odd * square + c[k - 1]
-    if n % 2 == 0:
-        even_slope, even = even_slope * square + even, even * square + c[0]
-    else:
-        even, odd, even_slope, odd_slope = odd, even, odd_slope, even_slope
-    return odd * x + even, 2.0 * x * (odd_slope * x + even_slope) + odd
+    return horner(c, n, x), horner_slope(c, n, x)
 
 
 @jit
 def keeps_sign(p, n):
     """Whether certainly p != 0 on [0, 1]: because p0 + p1 u + p2 u^2 stays farther from 0 than the sum of abs(p_k), k >= 3."""
-    sign, rest, more = (1.0 if p[0] > 0.0 else -1.0), abs(p[n]) if n > 2 and n % 2 == 1 else 0.0, 0.0
-    for k in range(3, n, 2):
-        rest, more = rest + abs(p[k]), more + abs(p[k + 1])
+    sign, rest = (1.0 if p[0] > 0.0 else -1.0), 0.0
+    for k in range(3, n + 1):
+        rest += abs(p[k])
     first, second, third = sign * p[0], sign * p[1], sign * p[2]
     low = min(first, first + second + third)
     if third > 0.0 and 0.0 < -second < 2.0 * third:
         low = first - second * second / (4.0 * third)
-    return low > rest + more
+    return low > rest
 
 
 @jit
@@ -108,20 +104,17 @@ def newton(p, n, low, high):
     share = at_low / (at_low - at_high) if at_low > 0.0 > at_high else 0.5
     if not 0.01 < share < 0.99:  # p may be nearly zero at an end, where rounding decides its sign: begin in the middle
         share = 0.5
-    u, step = low + share * (high - low), 0.0
+    u = low + share * (high - low)
     for _ in range(200):
-        value, slope = value_and_slope(p, n, u)
+        value = horner(p, n, u)
         if value > 0.0:
             low = u
         else:
             high = u
+        slope = horner_slope(p, n, u)
         following = u - value / slope if slope != 0.0 else 0.5 * (low + high)
-        last, step, rounding = step, abs(following - u), 2.0**-53 * following
         if not low <= following <= high:  # at equality the step has converged: bisection would lose nine digits
-            following, step = 0.5 * (low + high), 0.0
-        # A small step's next one would be its square times the curvature, which is step / last^2.
-        elif step <= rounding or (step < 0.01 * NARROW and step * (step / last) ** 2 <= rounding):
-            return following
+            following = 0.5 * (low + high)
         if abs(following - u) <= 2.0**-53 * following or high - low <= 2.0**-53 * high:
             return following
         u = following
@@ -191,14 +184,12 @@ def split(boxes, top, n):
 @jit
 def scale_gap(g, skip, order, h, p):
     """p_k = g_{k + skip} h^k for k = 0..order - skip, else 0: the series on [0, 1] without its known root at 0."""
-    even, odd, square, n = 1.0, h, h * h, order - skip
-    for k in range(0, n, 2):
-        p[k], p[k + 1] = g[k + skip] * even, g[k + 1 + skip] * odd
-        even, odd = even * square, odd * square
-    if n % 2 == 0:
-        p[n] = g[order] * even
-    for k in range(n + 1, p.size):
+    power = 1.0
+    for k in range(p.size):
         p[k] = 0.0
+    for k in range(order - skip + 1):
+        p[k] = g[k + skip] * power
+        power *= h
 
 
 @jit
