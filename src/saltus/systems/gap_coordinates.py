@@ -278,9 +278,8 @@ class InGapCoordinates(ContactModel):
         q, v, a = self.own_values(t, load, theta, velocity, acceleration)
         found = dict(super().margins(t, q, v, a, side, load))
         for place, name in self.gap_places.stands:
-            found[name + TURNS] = self._function(
-                name, [Jet(x, float(i == place)) for i, x in enumerate(self._each(q, True))]
-            ).first
+            jets = [Jet(x, float(i == place)) for i, x in enumerate(self._each(q, True))]
+            found[name + TURNS] = self._function(name, jets).first - 2.0**-18  # so that no rounding leads beyond its inverse
         return found
 
 
