@@ -2,9 +2,8 @@
 A beam of ten modes with a soft and with a hard stop
 ====================================================
 
-A cantilever of ten modes is shaken by a force at its tip, which meets a stop at 1. At the soft stop, a spring, the branch of
-orbits has two folds, to which those of harmonic balance tend with more harmonics, and sweeps up and down jump there. At the hard
-stop the sweep down jumps where the linear beam touches it.
+A cantilever shaken at its tip meets a stop at 1. At the soft one the branch has two folds, to which those of harmonic balance
+tend, and sweeps up and down jump there. At the hard one the sweep down jumps where the linear beam touches it.
 """
 
 import matplotlib.pyplot as plt
@@ -48,11 +47,12 @@ touched = brentq(lambda frequency: abs(linear(frequency)) - 1.0, 1.0, 1.2, xtol=
 branch = saltus.continue_orbit(saltus.find_orbit(soft, **soft.model.start()), "load.frequency", (0.93, 1.18))
 folds = [point.parameter for point in branch.special if point.kind == "LP"]
 errors = np.abs([np.subtract([fold(n, -1.0, (2.3, 2.6)), fold(n, 1.0, (1.001, 1.1))], folds) for n in (3, 7, 15)])
-values, (figure, axes) = np.linspace(0.96, 1.18, 12), plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+values, (_, axes) = np.linspace(0.96, 1.18, 12), plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
 saltus.plot(branch, ax=axes[0])
 for ax, system, name, falls in ((axes[0], soft, "soft stop", folds[1]), (axes[1], hard, "hard stop", touched)):
     sweep = saltus.frequency_sweep(system, values, periods=80, stop_early=False, max_period=1, **system.model.start())
-    ax.plot(sweep.value, sweep.amplitude.T, "o", fillstyle="none", label=["swept up", "swept down"])
+    for row, way in enumerate(("up", "down")):
+        ax.plot(sweep.value, sweep.amplitude[row], "^v"[row], color="0.2", fillstyle="none", label=f"swept {way}")
     ax.set(xlabel="frequency / first of the beam", ylabel="amplitude of the tip", title=name)
     ax.legend()
     assert np.array_equal(sweep.amplitude[1] > 1.0, sweep.value < falls)  # of all coordinates the tip goes furthest

@@ -48,12 +48,12 @@ motion = saltus.simulate(saltus.System(model=block, impact=saltus.NewtonImpact(e
 figure, (ax, bx) = plt.subplots(1, 2, figsize=(7, 3.2), layout="constrained")
 times = np.linspace(0.0, motion.time, 1500)
 (y, tilt), _ = motion.at(times)
-for name, sign in (("left", 1), ("right", -1)):
-    ax.plot(times, y - block.height((y, tilt)) - sign * block.lean((y, tilt)), label=f"{name} corner")
+for name, sign, line in (("left", 1, "-"), ("right", -1, "--")):
+    ax.plot(times, y - block.height((y, tilt)) - sign * block.lean((y, tilt)), line, label=f"{name} corner")
 ax.set(xlabel=r"$\tau$", ylabel="height over the floor")
 ax.legend()
 bx.plot(times, tilt, "0.3")
-bx.set(xlabel=r"$\tau$", ylabel="tilt")
+bx.set(xlabel=r"$\tau$", ylabel="tilt (rad)")
 fall = np.sqrt(2 * (1.6 - block.height((0, 0.3)) - block.lean((0, 0.3))))
 print(f"rest after {len(motion.impacts)} impacts, the first one off by {motion.impacts.time[0] - fall:.1e}")
 assert abs(motion.impacts.time[0] - fall) < 1e-13

@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from test_bodies import checked
 
 import saltus
 from saltus import Contact, ContactModel, NewtonImpact
@@ -90,13 +91,7 @@ def test_rows_of_unequal_masses_between_walls_keep_the_balances(seed):
 @pytest.mark.thorough
 def test_ten_thousand_rows_between_walls_keep_the_balances():
     """About one in sixty is refused: balls that collapse without a force, whose reactions are 0 up to rounding."""
-    rows, random = [row_between_walls(count) for count in range(2, 9)], np.random.default_rng(11)
-    impacts, refused = 0, 0
-    for i in range(10_000):
-        try:
-            impacts += check_balances(rows[i % len(rows)], random)
-        except saltus.MotionError:
-            refused += 1
+    impacts, refused = checked([row_between_walls(count) for count in range(2, 9)], check_balances, np.random.default_rng(11))
     assert impacts > 100_000
     assert refused <= 250
 
@@ -290,3 +285,17 @@ def test_lanes_with_a_dependent_gap_are_followed_as_one_by_one():
         np.testing.assert_allclose([many.x.values[i], many.velocity.values[i]], one.final_state, rtol=0, atol=1e-9)
         sampled = [many.sampled_x.values[i, 0], many.sampled_velocity.values[i, 0]]
         np.testing.assert_allclose(sampled, one.at(2.0 * math.pi), rtol=0, atol=1e-9)
+
+
+def test_a_class_that_is_no_dataclass_may_keep_sums():
+    """A model without numbers of its own works without the decorator in each kind of coordinates."""
+
+    class Pair(ContactModel):
+        coordinates = ("a", "b")
+        contacts = (Contact(name="between", coordinate={"b": 1.0, "a": -1.0}),)
+
+        def force(self, t, q, velocity, load):
+            return 0.0 * q[0], 0.0 * q[1]
+
+    motion = simulate(System(model=Pair(), impact=NewtonImpact(e=1.0)), a=0.0, b=1.0, velocity=(1.0, 0.0), duration=3.0)
+    np.testing.assert_allclose([motion.a, motion.b, *motion.velocity], [1.0, 3.0, 0.0, 1.0], rtol=0, atol=1e-14)

@@ -11,7 +11,7 @@ it on the others, which stay on the surface s = p (`dependent_sums`).
 from __future__ import annotations
 
 import math
-from dataclasses import fields, replace
+from dataclasses import fields, is_dataclass, replace
 from functools import cache
 from typing import Any, ClassVar
 
@@ -51,7 +51,7 @@ class InGapCoordinates(ContactModel):
 
     def as_given(self) -> Any:
         """The model as the user gave it."""
-        return self.own_class(**{field.name: getattr(self, field.name) for field in fields(self)})  # type: ignore[arg-type]
+        return self.own_class(**{name: getattr(self, name) for name in fields_of(self.own_class)})
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
@@ -86,7 +86,7 @@ class InGapCoordinates(ContactModel):
 
     def mirror(self, load: Any) -> Any:
         """That of the model as it was given, unless its mirror images swap coordinates or functions of them are in sums."""
-        return None if self.is_bent or self.own_class.images is not ContactModel.images else super().mirror(load)
+        return None if self.is_nonlinear or self.own_class.images is not ContactModel.images else super().mirror(load)
 
     @property
     def stops(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -97,7 +97,7 @@ class InGapCoordinates(ContactModel):
         """A as rows, behind them B, and for each the coefficients of load channels in m(t), n(t) and of functions in h(q)."""
         names = columns_of(super().coordinates, self.gap_places.stands)
         rows = [[float(i == j) for j in range(len(names))] for i in range(len(self.gap_places.names))]
-        moving, bending = ([dict[str, Any]() for _ in rows] for _ in range(2))
+        moving, nonlinear = ([dict[str, Any]() for _ in rows] for _ in range(2))
         parts: list[Part] = [*super().contacts, *super().surfaces, *super().frictions]
         places = self.gap_places.contacts + self.gap_places.surfaces + self.gap_places.frictions
         for part, (i, sign) in zip(parts, places, strict=True):
@@ -105,8 +105,8 @@ class InGapCoordinates(ContactModel):
                 given = terms_of(part)
                 rows[i] = [given.get(name, 0.0) for name in names]
                 moving[i] = {name: factor for name, factor in given.items() if name in self.channels}
-                bending[i] = {name: factor for name, factor in given.items() if name not in (*names, *self.channels)}
-        return rows, moving, bending
+                nonlinear[i] = {name: factor for name, factor in given.items() if name not in (*names, *self.channels)}
+        return rows, moving, nonlinear
 
     @property
     def dependent(self) -> int:
@@ -114,7 +114,7 @@ class InGapCoordinates(ContactModel):
         return len(self.gap_places.names) - len(self.own_class.coordinates)
 
     @property
-    def is_bent(self) -> bool:
+    def is_nonlinear(self) -> bool:
         """Whether a sum has functions of coordinates among its terms, so that T depends on them."""
         return bool(self.gap_places.stands) or any(needed for _, needed in self.gap_places.solved)
 
@@ -135,7 +135,7 @@ class InGapCoordinates(ContactModel):
     def own_values(self, t: Any, load: Any, *given: Any) -> list[Any]:
         """The user's coordinates and as many of their derivatives as are given of those of this model, two at most."""
         moved = [less(self._each(values), self.walls_at(t, load, order)) for order, values in enumerate(given)]
-        if not self.is_bent:
+        if not self.is_nonlinear:
             back = self._back()
             return [as_given([weighted(row, values) for row in back]) for values in moved]
         return derivatives_along(self._solved, moved)
@@ -148,21 +148,21 @@ class InGapCoordinates(ContactModel):
 
     def _summed(self, q: list[Any]) -> list[Any]:
         """A q + h(q)."""
-        rows, _, bending = self.gap_sums()
+        rows, _, nonlinear = self.gap_sums()
         u, stands = list(q), dict(self.gap_places.stands)
         for place, name in stands.items():
             u[place] = self._function(name, q)
-        bent = [weighted(list(terms.values()), [self._function(name, q) for name in terms]) for terms in bending]
-        return [weighted((*row, 1.0), (*u, more)) for row, more in zip(rows, bent, strict=True)]
+        added = [weighted(list(terms.values()), [self._function(name, q) for name in terms]) for terms in nonlinear]
+        return [weighted((*row, 1.0), (*u, more)) for row, more in zip(rows, added, strict=True)]
 
     def _solved(self, sums: list[Any]) -> list[Any]:
         """The coordinates q of which A q + h(q) are these sums."""
-        rows, _, bending = self.gap_sums()
+        rows, _, nonlinear = self.gap_sums()
         back, stands, q = inverse(rows, self.gap_places.order), dict(self.gap_places.stands), [0.0] * len(sums)
         for place, needed in self.gap_places.solved:
             row, q[place] = back[place], weighted(back[place], sums)
             for name in needed:
-                factor = weighted(row, [terms.get(name, 0.0) for terms in bending])
+                factor = weighted(row, [terms.get(name, 0.0) for terms in nonlinear])
                 q[place] = q[place] - factor * self._function(name, q)
             if place in stands:
                 q[place] = getattr(self, stands[place] + INVERSE)(q[place])
@@ -179,7 +179,7 @@ class InGapCoordinates(ContactModel):
 
     def own_slopes(self, t: Any, theta: Any, load: Any) -> list[list[Any]]:
         """T = dq/dz as rows."""
-        if not self.is_bent:
+        if not self.is_nonlinear:
             return self._back()
         z, size = less(self._each(theta), self.walls_at(t, load)), range(len(self.coordinates))
         columns = [self._solved([Jet(x, float(i == k)) for i, x in enumerate(z)]) for k in size]
@@ -195,7 +195,7 @@ class InGapCoordinates(ContactModel):
         places, rates = self.gap_values(t, load, _values(position), _values(velocity))
         for place, name in self.gap_places.stands:
             there, back = (self._each(x, True)[place] for x in (_values(position), self.own_values(t, load, places)[0]))
-            if not np.all(np.abs(back - there) < 1e-6):
+            if not np.all(np.abs(back - there) < 1e-6):  # rounding grows without bound beside the turn
                 raise ParameterError(f"a state lies beyond where {name}{TURNS}, as its {name}{INVERSE} leads elsewhere", name)
         return self.closed_exactly(*np.split(_stacked([*self._each(places), *self._each(rates)]), 2))
 
@@ -283,6 +283,12 @@ class InGapCoordinates(ContactModel):
         return found
 
 
+@cache
+def fields_of(kind: type) -> tuple[str, ...]:
+    """The names of the fields of a dataclass; none of any other class."""
+    return tuple(field.name for field in fields(kind)) if is_dataclass(kind) else ()
+
+
 def in_gap_coordinates(model: Any) -> Any:
     """A model in coordinates of which each contact holds one; itself, if each of its contacts holds one already.
 
@@ -298,8 +304,8 @@ def in_gap_coordinates(model: Any) -> Any:
     if taken := {name for name in (*vars(InGapCoordinates), "own_class") if name not in dir(ContactModel)} & {*dir(kind)}:
         raise ParameterError(f"{kind.__name__} has a part named {min(taken)}, as its coordinates of gaps do: rename it", "model")
     made = object.__new__(_class_in(kind, places))  # its numbers have been checked
-    for field in fields(model):
-        object.__setattr__(made, field.name, getattr(model, field.name))
+    for name in fields_of(kind):
+        object.__setattr__(made, name, getattr(model, name))
     if made.dependent:
         _check_dependent(made)
     return made

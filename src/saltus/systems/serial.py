@@ -8,14 +8,13 @@ from __future__ import annotations
 import dataclasses
 from collections import UserDict, defaultdict
 from collections.abc import Callable, Iterator, Mapping
-from functools import cache
 from importlib import import_module
 from typing import Any, TypeVar
 
 import numpy as np
 
 from saltus.errors import ParameterError, SaltusError, near, shown
-from saltus.systems.gap_coordinates import IN_GAPS, in_gap_coordinates
+from saltus.systems.gap_coordinates import IN_GAPS, fields_of, in_gap_coordinates
 from saltus.systems.impact_laws import Coefficients, Factors, ImpactLaw, NamedParts
 from saltus.systems.load import Load
 from saltus.systems.model import Count, Model, OneContactModel, check_one_contact
@@ -31,13 +30,7 @@ def children(node: Any) -> dict[str, Any]:
     if isinstance(node, (Sum, Factors)):
         return {str(i): term for i, term in enumerate(node.terms if isinstance(node, Sum) else node)}
     kind: Any = type(node)
-    return {name: getattr(node, name) for name in _fields_of(kind)}
-
-
-@cache
-def _fields_of(kind: type) -> tuple[str, ...]:
-    """The names of the fields of a dataclass; none of any other class."""
-    return tuple(f.name for f in dataclasses.fields(kind)) if dataclasses.is_dataclass(kind) else ()
+    return {name: getattr(node, name) for name in fields_of(kind)}
 
 
 def is_number(value: Any) -> bool:
@@ -229,7 +222,7 @@ def to_dict(part: Any) -> Any:
     kind: Any = type(part)
     if hasattr(part, "to_table"):
         return {"type": kind.__name__, **part.to_table()}
-    fields = {name: getattr(part, name) for name in _fields_of(kind)}
+    fields = {name: getattr(part, name) for name in fields_of(kind)}
     fields = {name: value for name, value in fields.items() if value is not None}
     return fields if isinstance(part, Signal) and not isinstance(part, Pulse) else {"type": kind.__name__, **fields}
 

@@ -258,7 +258,7 @@ def within_window(system: System, points: np.ndarray, window: Window, shrunk: An
         return states
     bounds = np.asarray(window)
     rows: Any = inner.model
-    if inner is not system and rows.is_bent:  # the box around the states
+    if inner is not system and rows.is_nonlinear:  # the box around the states
         there = in_gaps(system, states).reshape(-1, len(window))
         bounds = np.stack([there.min(axis=0), there.max(axis=0)], axis=1)
     elif inner is not system:  # the box around the window

@@ -38,12 +38,6 @@ def horner_slope(c, n, x):
 
 
 @jit
-def value_and_slope(c, n, x):
-    """sum_{k=0..n} c[k] x^k, n >= 1, and its derivative."""
-    return horner(c, n, x), horner_slope(c, n, x)
-
-
-@jit
 def keeps_sign(p, n):
     """Whether certainly p != 0 on [0, 1]: because p0 + p1 u + p2 u^2 stays farther from 0 than the sum of abs(p_k), k >= 3."""
     sign, rest = (1.0 if p[0] > 0.0 else -1.0), 0.0

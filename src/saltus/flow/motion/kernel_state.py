@@ -45,7 +45,7 @@ class KernelState:
         self.array, self._memory = motion_record(taylor_order(request.tol), run.structure.sizes)  # one record MOTION
         mode, side, leave_by = self._at_contact(request, run)
         piece = int(breaks.searchsorted(request.time, side="right")) if breaks.size else 0
-        dense = int(request.dense or request.sample_times is not None or _bends(request.system))
+        dense = int(request.dense or request.sample_times is not None or _is_nonlinear(request.system))
         where = (at.local, at.first, mode, side, piece, leave_by, dense)
         AT_START.pack_into(self._memory, 0, *where, at.last, at.end, at.length, request.tol)
 
@@ -171,9 +171,9 @@ class RecorderSettings:
 MOST = RecorderSettings()
 
 
-def _bends(system: System) -> bool:
+def _is_nonlinear(system: System) -> bool:
     """Whether velocities of the system that was given depend on positions, which events do not have, but steps do."""
-    return getattr(system.model, "is_bent", False)
+    return getattr(system.model, "is_nonlinear", False)
 
 
 FIELDS = ("start", "length", "side", "series")
@@ -201,7 +201,7 @@ class Recorder:
         self._system, self._times, self._columns = request.system, request.sample_times, run.structure.sizes.columns
         self._own, self._several = run.structure.sizes.own, run.structure.several
         self._begin, self._drops = request.start[: self._own], not request.dense and request.sample_times is None
-        self._bends = _bends(request.system)
+        self._bends = _is_nonlinear(request.system)
         self._wide = request.dense and request.sample_times is None and request.dense_tangent
         self._rows = self._own * (1 + self._columns if self._wide else 1), order + 2
         self._keeps_steps = self._bends or not self._drops
