@@ -11,6 +11,7 @@ import platform
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import Any, cast
 
 from llvmlite import binding, ir
@@ -270,6 +271,11 @@ def loop(builder: Any, begin: int, end: Any, starts: Sequence[Vec] = (), after: 
     done = builder.append_basic_block("after")
     builder.cbranch(builder.icmp_signed("<", following, LONG(end) if isinstance(end, int) else end), body, done)
     builder.position_at_end(done)
+
+
+def inverse_of(k: int) -> tuple[float, float]:
+    """1/k as the sum of two numbers, the second of which is what rounding takes from the first."""
+    return 1.0 / k, float(Fraction(1, k) - Fraction(1.0 / k))
 
 
 def constant_table(builder: Any, numbers: list[float]) -> Any:
