@@ -17,8 +17,8 @@ from saltus.taylor.private_numba import OPTIONS
 
 _kernel = {"np": np, "ZERO": ZERO} | dict.fromkeys(("jit", "lean_jit"), numba.njit(**OPTIONS))
 exec(compiled_part(roots), _kernel)
-excluded, first_root, horner, horner_slope, newton, to_bernstein, variations = (
-    _kernel[name] for name in ("excluded", "first_root", "horner", "horner_slope", "newton", "to_bernstein", "variations")
+excluded, first_root, horner, value_and_slope, newton, to_bernstein, variations = (
+    _kernel[name] for name in ("excluded", "first_root", "horner", "value_and_slope", "newton", "to_bernstein", "variations")
 )
 EPS = 2.0**-52
 DEGREES = st.integers(2, 23)
@@ -29,7 +29,7 @@ def test_a_polynomial_and_its_slope_are_those_of_numpy(degree):
     p = np.polynomial.Polynomial(np.random.default_rng(degree).normal(size=degree + 1))
     for x in (0.0, 0.3, 1.0, -0.7):
         assert horner(p.coef, degree, x) == pytest.approx(p(x), abs=1e-14)
-        assert horner_slope(p.coef, degree, x) == pytest.approx(p.deriv()(x), abs=1e-13)
+        assert value_and_slope(p.coef, degree, x) == (horner(p.coef, degree, x), pytest.approx(p.deriv()(x), abs=1e-13))
 
 
 def solve(coefficients):

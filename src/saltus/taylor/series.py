@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 from saltus.taylor.graph import LEAVES, RECORD_WIDTH, degree
 from saltus.taylor.memory import Memory, ModeRows, Node, Place, Tape
@@ -28,7 +28,7 @@ from saltus.taylor.rules import (
     mode_loops,
     needs_sums,
 )
-from saltus.taylor.vectors import CACHE_LINE, DOUBLE, LONG, Coefficient, Vec, add, constant_table, dot, inverse_of, multiply, subtract
+from saltus.taylor.vectors import CACHE_LINE, DOUBLE, LONG, Coefficient, Vec, add, dot, inverses, multiply, quotient, subtract
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Series:
         self._nodes: dict[int, Node] = {}  # the node of each row, by the row's id
         self._scaled: dict[int, Row] = {}
         self._records: dict[int, Any] = {}
-        self._inverses: dict[int, Any] = {}
+        self._inverses: dict[int, tuple[Vec, Vec]] = {}
         self._sums: dict[tuple[int, int], tuple[Vec, Vec]] = {}
         self._loops: list[InnerLoop] = []
         self._kept: list[Row] = []
@@ -82,8 +82,7 @@ class Series:
         self._integrated = [*self.positions.values(), *kept]
         highest = max((row.degree for row in self.rows if row.degree is not None), default=0)
         self.written_out = 2 * (highest // 2 + 1)  # the number of orders whose code is written out
-        inverses = [inverse_of(max(k, 1)) for k in range(layout.capacity + 2)]
-        self._tables = [constant_table(self.builder, list(part)) for part in zip(*inverses, strict=True)]
+        self._tables = inverses(self.builder, layout.capacity + 2)
 
     def _row(self, node: Node) -> Row:
         op = node[0]
@@ -296,11 +295,12 @@ class Series:
         """A number divided by coefficient 0 of a series."""
         if value is None:
             return None
-        if self.memory.arithmetic.exact:
-            return value / self.start(row)
-        if id(row) not in self._inverses:
-            self._inverses[id(row)] = 1.0 / self.start(row)
-        return multiply(value, self._inverses[id(row)])
+        arithmetic, start = self.memory.arithmetic, self.start(row)
+        if not arithmetic.divides and id(row) not in self._inverses:
+            self._inverses[id(row)] = start.inverse()
+        if arithmetic.divides or (arithmetic.exact and self.ahead is None):
+            return value / start
+        return quotient(value, *self._inverses[id(row)])
 
     def product(self, a: Row, b: Row, first: bool = True, last: bool = True) -> Coefficient:
         """sum_{j=0}^{k} a_j b_{k-j} for this order k; without a_0 b_k if not `first`, without a_k b_0 if not `last`."""
@@ -325,23 +325,18 @@ class Series:
         return len(row.first) > self.order if self.ahead is None else len(row.pair) > self.ahead
 
     def _divided(self, value: Coefficient, more: int) -> Coefficient:
-        """A number divided by this order, or by a following one.
-
-        One that must be exact is multiplied by both parts of the inverse, which takes two thirds of a division's time: rounded
-        once, as the quotient is. With the first part alone a coefficient would have the same error in every step.
-        """
+        """A number divided by this order, or by a following one."""
         arithmetic = self.memory.arithmetic
         if value is None or (self.ahead is None and self.order + more == 1):
             return value
-        if arithmetic.exact and not (arithmetic.fused and isinstance(value, Vec)):
-            return value / (float(self.order + more) if self.ahead is None else self._number + float(self.ahead + more))
         if self.ahead is None:
-            inverse, rest = inverse_of(self.order + more)
-        else:
-            index = self.builder.add(self.order, LONG(self.ahead + more))
-            parts = [self.builder.load(self.builder.gep(table, [LONG(0), index])) for table in self._tables]
-            inverse, rest = (arithmetic.everywhere(self.builder, part) for part in parts)
-        return cast(Vec, value).fma(inverse, multiply(rest, value)) if arithmetic.exact else multiply(inverse, value)
+            k = self.order + more
+            return value / float(k) if arithmetic.exact else multiply(1.0 / k, value)
+        if arithmetic.divides:
+            return value / (self._number + float(self.ahead + more))
+        index = self.builder.add(self.order, LONG(self.ahead + more))
+        parts = [self.builder.load(self.builder.gep(table, [LONG(0), index])) for table in self._tables]
+        return quotient(value, *(arithmetic.everywhere(self.builder, part) for part in parts))
 
     def _before_sums(self, row: Row) -> AbstractContextManager[Any]:
         """The place for the code of a series' coefficient: before the sums if all that it needs is known there."""

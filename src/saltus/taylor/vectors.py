@@ -47,7 +47,9 @@ class Arithmetic:
 
     width: int
     fused: bool = True
-    exact: bool = False  # divides, and calls the C library's sine and cosine, where lanes use reciprocals and polynomials
+    exact: bool = (
+        False  # quotients are rounded once, and the C library's sine and cosine called; lanes use reciprocals, polynomials
+    )
 
     def of(self, element: Any) -> Any:
         """LLVM's type of a number, a truth or an integer for each lane."""
@@ -69,6 +71,11 @@ class Arithmetic:
         first = builder.insert_element(undefined, number, ir.Constant(INDEX, 0))
         zeros = ir.Constant(self.of(INDEX), [0] * self.width)
         return Vec(builder, builder.shuffle_vector(first, undefined, zeros), self)
+
+    @property
+    def divides(self) -> bool:
+        """Whether quotients need divisions: without fused multiply-adds a product with an inverse in two parts is no quotient."""
+        return self.exact and not self.fused
 
     def unfused(self) -> Arithmetic:
         """The same without fused multiply-adds: a law that takes the difference of two equal products must get 0."""
@@ -127,6 +134,11 @@ class Vec:
     def fma(self, factor: Any, addend: Any) -> Vec:
         """self * factor + addend, rounded once where the machine can."""
         return self.intrinsic("llvm.fmuladd", factor, addend)
+
+    def inverse(self) -> tuple[Vec, Vec]:
+        """1 / self, and what rounding takes from it."""
+        inverse = 1.0 / self
+        return inverse, (-inverse).fma(self, 1.0) * inverse
 
     def function(self, name: str, *others: Any) -> Vec:
         """An elementary function by its name in the C library."""
@@ -273,9 +285,20 @@ def loop(builder: Any, begin: int, end: Any, starts: Sequence[Vec] = (), after: 
     builder.position_at_end(done)
 
 
-def inverse_of(k: int) -> tuple[float, float]:
-    """1/k as the sum of two numbers, the second of which is what rounding takes from the first."""
-    return 1.0 / k, float(Fraction(1, k) - Fraction(1.0 / k))
+def quotient(value: Coefficient, inverse: Vec, rest: Vec) -> Coefficient:
+    """A number times an inverse in two parts (`Vec.inverse`), in two thirds of a division's time.
+
+    What must be exact is rounded once, as the quotient is: with the first part alone the coefficients of a series would have the
+    same error in every step.
+    """
+    return dot([(inverse, value)], multiply(rest, value) if inverse.arithmetic.exact else None)
+
+
+def inverses(builder: Any, count: int) -> list[Any]:
+    """Tables of 1/k for k below `count`, and of what rounding takes from it."""
+    whole = range(1, count)
+    parts = [1.0 / k for k in whole], [float(Fraction(1, k) - Fraction(1.0 / k)) for k in whole]
+    return [constant_table(builder, [1.0, *part]) for part in parts]
 
 
 def constant_table(builder: Any, numbers: list[float]) -> Any:

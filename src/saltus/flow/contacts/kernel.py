@@ -69,7 +69,7 @@ from saltus.flow.contacts.tangent import (
 )
 from saltus.flow.kernel.layout import SHORTEST, ZERO, EventCode, Mode, Status
 from saltus.flow.kernel.memory import ContactsParts
-from saltus.flow.kernel.roots import NEVER, SIMPLE, contact_root, horner, horner_slope, margin_root
+from saltus.flow.kernel.roots import NEVER, SIMPLE, contact_root, margin_root, value_and_slope
 from saltus.flow.kernel.steps import columns_at_event, expand, motion_end, move, record_step, step_arrays
 from saltus.taylor import jit, lean_jit
 
@@ -245,7 +245,8 @@ def contacts_closing_with(motion, hit, tau):
             continue
         gap_series(motion, i, contact_position(motion, i), order, g)
         size = abs(g[0]) + abs(g[1]) * tau + abs(g[2]) * tau * tau + GAP_ROUNDING * abs(contact_position(motion, i))
-        if horner(g, order, tau) <= NEAR * size and horner_slope(g, order, tau) < 0.0:
+        value, slope = value_and_slope(g, order, tau)
+        if value <= NEAR * size and slope < 0.0:
             bits |= 1 << i
     return bits
 

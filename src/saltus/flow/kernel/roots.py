@@ -29,12 +29,21 @@ def horner(c, n, x):
 
 
 @jit
-def horner_slope(c, n, x):
-    """The derivative of sum_{k=0..n} c[k] x^k."""
-    value = n * c[n]
+def value_and_slope(c, n, x):
+    """sum_{k=0..n} c[k] x^k and its derivative, n >= 1: in one loop, as each waits for its own last sum."""
+    value, slope = c[n], n * c[n]
     for k in range(n - 1, 0, -1):
-        value = value * x + k * c[k]
-    return value
+        value, slope = value * x + c[k], slope * x + k * c[k]
+    return value * x + c[0], slope
+
+
+@jit
+def both_sums(a, b, n, x):
+    """sum_{k=0..n} a[k] x^k and sum_{k=0..n} b[k] x^k."""
+    first, second = a[n], b[n]
+    for k in range(n - 1, -1, -1):
+        first, second = first * x + a[k], second * x + b[k]
+    return first, second
 
 
 @jit
@@ -100,12 +109,11 @@ def newton(p, n, low, high):
         share = 0.5
     u = low + share * (high - low)
     for _ in range(200):
-        value = horner(p, n, u)
+        value, slope = value_and_slope(p, n, u)
         if value > 0.0:
             low = u
         else:
             high = u
-        slope = horner_slope(p, n, u)
         following = u - value / slope if slope != 0.0 else 0.5 * (low + high)
         if not low <= following <= high:  # at equality the step has converged: bisection would lose nine digits
             following = 0.5 * (low + high)

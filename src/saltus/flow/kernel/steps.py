@@ -11,7 +11,7 @@ import numpy as np
 
 from saltus.flow.kernel.layout import DEFECT, GAP, ROUGHER, SAFETY, SMALLEST, EventCode
 from saltus.flow.kernel.memory import StateArrays, StepArrays
-from saltus.flow.kernel.roots import horner
+from saltus.flow.kernel.roots import both_sums, horner
 from saltus.taylor import jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
@@ -141,7 +141,7 @@ def move(motion, tau):
     """Take the state at `tau` from the series of a step; returns whether the model's own part of it is finite."""
     q, v, order, finite = motion.coordinate_series, motion.velocity_series, motion.order, True
     for i in range(motion.dof):
-        motion.coordinates[i], motion.velocities[i] = horner(q[i], order, tau), horner(v[i], order, tau)
+        motion.coordinates[i], motion.velocities[i] = both_sums(q[i], v[i], order, tau)
         if i < motion.own:
             finite = finite and math.isfinite(motion.coordinates[i]) and math.isfinite(motion.velocities[i])
     return finite
