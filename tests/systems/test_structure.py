@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import saltus
 
@@ -111,17 +112,58 @@ def test_a_structure_with_other_numbers_is_not_traced_anew() -> None:
 @pytest.mark.parametrize("coupled", [False, True])
 def test_a_structure_of_another_size_has_the_same_code(coupled: bool) -> None:
     from saltus.flow.kernel.compiled import structure_functions
+    from saltus.flow.lanes.compiled_lanes import lane_functions
     from saltus.taylor.generated import functions_text
     from saltus.taylor.tracing import trace
 
     def code(size: int) -> str:
-        given = chain(size)
-        if coupled:
-            given["damping"][0, 0] += 1.0  # no combination of mass and stiffness, so that it couples the modes
-        model = saltus.Structure(**given, contacts=[STOP], surfaces=[SOFT], forces={"drive": 0})
-        return functions_text(structure_functions(trace(saltus.System(model=model, load=LOAD))))
+        model = saltus.Structure(**chain_of(size, coupled), contacts=[STOP], surfaces=[SOFT], forces={"drive": 0})
+        traced = trace(saltus.System(model=model, load=LOAD))
+        return functions_text([*structure_functions(traced), *lane_functions(traced)])
 
     assert code(4) == code(9)
+
+
+def chain_of(size: int, coupled: bool) -> dict[str, np.ndarray]:
+    """The chain, with a damping that is no combination of mass and stiffness, so that it couples the modes, or without."""
+    given = chain(size)
+    given["damping"][0, 0] += float(coupled)
+    return given
+
+
+def driven(size: int, coupled: bool) -> tuple[saltus.System, list[dict]]:
+    """A chain against its stop, and starts that hit it."""
+    model = saltus.Structure(**chain_of(size, coupled), contacts=[STOP], forces={"drive": 0})
+    starts = [model.start(0.2, 0.1 * np.arange(1.0, size + 1) * factor) for factor in (0.8, 1.0, 1.3, 2.0, 3.0)]
+    return saltus.System(model=model, load=LOAD, impact=saltus.NewtonImpact(e=0.7)), starts
+
+
+def followed_together(system: saltus.System, starts: list[dict], **asked) -> xr.Dataset:
+    """The motions of an ensemble from these starts."""
+    columns = {name: [start[name] for start in starts] for name in system.model.coordinates}
+    return saltus.simulate_many(system, **columns, velocity=[*np.array([start["velocity"] for start in starts]).T], **asked)
+
+
+@pytest.mark.parametrize("coupled", [False, True])
+def test_ensembles_of_two_sizes_follow_their_own_motions(coupled: bool) -> None:
+    for size in (4, 9):  # the second with the code of the first
+        system, starts = driven(size, coupled)
+        found = followed_together(system, starts, periods=4, tol=1e-12)
+        ends = np.array([found[name] for name in system.model.coordinates])
+        motions = [saltus.simulate(system, **start, periods=4) for start in starts]
+        assert min(len(motion.impacts) for motion in motions) >= 4
+        assert np.abs(ends - np.array([motion.position for motion in motions]).T).max() < 1e-10
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("coupled", [False, True])
+def test_an_ensemble_has_the_derivatives_of_its_motions(coupled: bool) -> None:
+    (system, starts), paths = driven(3, coupled), ["load.frequency", "impact.e"]
+    found = followed_together(system, starts, periods=2, tol=1e-12, sensitivities=paths).derivative
+    for start, own in zip(starts, found.values, strict=True):
+        alone = saltus.sensitivities(system, parameters=paths, **start, periods=2)
+        assert len(alone.motion.impacts) > 0
+        assert np.abs(own - np.hstack([alone.state, alone.parameters])).max() < 1e-9 * np.abs(own).max()
 
 
 def test_the_series_of_derivatives_are_as_long_for_any_size() -> None:

@@ -57,7 +57,7 @@ class LaneSeries:
     def __init__(self, system):
         self.run = program(system)
         self.plan, (self.function, *_) = load_lane_functions(self.run.trace)
-        self.call = njit(types.void(written_type(LANE_SERIES), types.float64[::1], types.int64))(_call)
+        self.call = njit(types.void(written_type(LANE_SERIES), *LANE_SERIES.args))(_call)
 
     def coefficients(self, states, order):
         """Of positions, velocities, accelerations, shape (lanes, coordinates, STRIDE); `states` = (t, positions, velocities)."""
@@ -73,7 +73,7 @@ class LaneSeries:
             memory[part : part + len(values)] = values[:, None]
         for k in range(self.plan.records * RECORD_WIDTH):
             memory[places.records + k] = PIECE[k]
-        self.call(self.function, m, order)
+        self.call(self.function, m, np.array(places), order)
         series = [
             memory[part : part + rows * STRIDE].reshape(rows, STRIDE, WIDTH)
             for part in (places.positions, places.velocities, places.accelerations)
@@ -81,8 +81,8 @@ class LaneSeries:
         return [part.transpose(2, 0, 1) for part in series]
 
 
-def _call(function, m, order):
-    function(m, order)
+def _call(function, m, places, order):
+    function(m, places, order)
 
 
 def test_series_of_each_operation_and_of_every_order_in_lanes():

@@ -10,6 +10,7 @@ import numpy as np
 
 from saltus.taylor.graph import RECORD_WIDTH, Expr, combine, differentiate, number, ordered, substitute
 from saltus.taylor.load_tables import expand_record
+from saltus.taylor.numba_types import Array
 from saltus.taylor.rules import FUNCTIONS
 from saltus.taylor.vectors import DOUBLE, LONG, Arithmetic, Vec, loop
 
@@ -101,10 +102,14 @@ class Places:
     The kinds of leaves are `time`, `origin`, `side`; `coordinate`, `velocity`, `parameter` and `constant`, of which there are
     several; and `record`. Records are in `table`, and the code expands them about the time. If another argument is given for
     them, it holds their coefficients already expanded about the time `record_time`.
+
+    `parts` are the names of parts of the first argument, in whose places names of arguments may stand; the argument `places` has
+    their first slots, which are thus no part of the code.
     """
 
     arguments: tuple[str, ...]
     leaves: dict[str, Place]
+    parts: tuple[str, ...] = ()
 
 
 class Memory:
@@ -115,6 +120,13 @@ class Memory:
         self.arguments: dict[str, Any] = dict(zip(places.arguments, arguments, strict=True))
         if "env" in self.arguments:
             self.arguments |= zip(ENVIRONMENT, self.arguments["env"], strict=True)
+        self.arguments |= {name: self._part(k) for k, name in enumerate(places.parts)}
+
+    def _part(self, k: int) -> Array:
+        """A part of the first argument."""
+        b, whole = self.builder, next(iter(self.arguments.values()))
+        first = b.load(b.gep(self.arguments["places"].data, [LONG(k)]))
+        return Array(b.gep(whole.data, [b.mul(first, LONG(self.arithmetic.width))]), (None,))
 
     def pointer(self, place: Place) -> Any:
         """LLVM's pointer to an element of an array, to the first one of a row of a matrix, or to a slot of one vector."""

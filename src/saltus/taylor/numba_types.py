@@ -276,7 +276,8 @@ def _llvm_types(kind: Any) -> list[Any]:
     if isinstance(kind, types.BaseTuple):
         return [part for each in _members(kind) for part in _llvm_types(each)]
     if isinstance(kind, types.Array):
-        return [DOUBLE.as_pointer(), *[LONG] * (kind.ndim - 1)]
+        element = DOUBLE if isinstance(kind.dtype, types.Float) else LONG
+        return [element.as_pointer(), *[LONG] * (kind.ndim - 1)]
     return [DOUBLE if isinstance(kind, types.Float) else LONG]
 
 

@@ -83,7 +83,7 @@ def resolve_impacts(lanes, hit, which):
     Lanes are not resolved, and unchanged, if the speeds that are left are so small that an accumulation may end, or all 0.
     """
     speed, matrices = splat(0.0), lanes.code.impact
-    matrices(lanes.memory)
+    matrices(lanes.memory, lanes.places)
     for i in range(lanes.sizes.contacts):
         rate = (1.0 * lanes.sizes.signs[i]) * lanes.new_velocity[lanes.sizes.coordinates[i]]
         speed = select(mask(hit & bits(absolute(which - 1.0 * i) < 0.5)), -rate, speed)

@@ -137,7 +137,7 @@ def free_step(lanes, alive):
     Returns bits of the lanes in which a gap closes, bits of the lanes in which nothing is in doubt, and the step.
     """
     series = lanes.code.series
-    series(lanes.memory, lanes.sizes.order)
+    series(lanes.memory, lanes.places, lanes.sizes.order)
     size, now, limit = state_size(lanes), lanes.now, lanes.step_limit
     natural = natural_step(lanes, size)
     h = minimum(natural, limit - now)
@@ -199,7 +199,7 @@ def one_free_step(lanes, alive):
         sign = select(free, splat(1.0 * lanes.sizes.signs[i]), sign)
         contact, which = select(free, lanes.contacts[i], contact), select(free, splat(1.0 * i), which)
     lanes.free_position, lanes.free_velocity, series = x, v, lanes.code.one_free
-    series(lanes.memory, lanes.sizes.order)
+    series(lanes.memory, lanes.places, lanes.sizes.order)
     size, now, limit = state_size(lanes), lanes.now, lanes.step_limit
     natural = row_step(lanes.velocities[0], lanes.sizes.order, size, lanes.settings.limits)
     h, start = minimum(natural, limit - now), x - contact

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cache
 from types import ModuleType
 from typing import Any
@@ -29,7 +29,7 @@ from saltus.flow.lanes import (
     memory,
     sampling,
 )
-from saltus.flow.lanes.memory import SLOTS, MemoryPlan
+from saltus.flow.lanes.memory import SLOTS, MemoryPlan, Slot
 from saltus.flow.one_contact import lane_handoff as one_contact_handoff
 from saltus.flow.one_contact import lane_step
 from saltus.taylor import (
@@ -45,6 +45,7 @@ from saltus.taylor import (
     digest,
     entry_point,
     is_compiled,
+    is_steep,
     lane_memory,
     lane_vectors,
     load_functions,
@@ -190,71 +191,72 @@ def lane_functions(trace: Trace) -> list[WrittenFunction]:
     return [*functions, _one_free(trace, plan, known)] if trace.several else functions
 
 
-def _function(name: str, places: Places, content: Sequence[Any]) -> WrittenFunction:
+def _function(name: str, plan: MemoryPlan, leaves: dict[str, Slot], content: Any, *more: str) -> WrittenFunction:
     """A function of the lanes; its signature has its name in `function_types.py`."""
+    parts = plan.places._fields if plan.data else ()
+    places = Places(("m", "places", *more), leaves, parts)
     return WrittenFunction(name, getattr(function_types, name.upper()), places, LANES, content)
 
 
-def _leaves(plan: MemoryPlan, time: int, position: int, velocity: int) -> dict[str, tuple[str, int]]:
+def _leaves(plan: MemoryPlan, time: int, position: str, velocity: str) -> dict[str, Slot]:
     """The places of a trace's leaves in the lanes' memory, for one of the times and one of the states that it holds."""
-    parts = {"coordinate": position, "velocity": velocity, "parameter": plan.places.parameters, "free": plan.places.free}
-    parts |= {"constant": plan.places.constants, "record": plan.places.records}
+    parts = {"coordinate": position, "velocity": velocity, "parameter": "parameters", "free": "free"}
+    parts |= {"constant": "constants", "record": "records"}
     numbers = {"time": time, "record_time": SLOTS.now, "origin": SLOTS.origin, "side": SLOTS.side}
-    parts["slide"], parts["datum"] = parts["parameter"] + plan.parameters, parts["constant"] + plan.constants
-    return {op: ("m", slot) for op, slot in (parts | numbers).items()}
+    behind = {"slide": plan.slot("parameters", plan.parameters), "datum": plan.slot("constants", plan.constants)}
+    return {op: plan.slot(part) for op, part in parts.items()} | {op: ("m", slot) for op, slot in numbers.items()} | behind
 
 
 def _series(trace: Trace, plan: MemoryPlan, known: dict[Expr, int]) -> WrittenFunction:
-    """`lane_series(m, order)`: the series of positions and velocities from the state, of the accelerations and of the margins.
+    """`lane_series(m, places, order)`: the series of positions and velocities from the state, of the accelerations and of the
+    margins.
 
     Positions and velocities have coefficients 0..order, the others 0..order - 1; the order is even, and at least LOWEST_ORDER.
     """
 
-    def rows(part: int, count: int) -> list[tuple[str, int]]:
-        return [("m", part + row * SERIES_LENGTH) for row in range(count)]
+    def row(part: str, number: int) -> Slot:
+        return plan.slot(part, number * SERIES_LENGTH)
 
-    parts, own, inputs = plan.places, trace.local_rows, trace.inputs_of_modes
-    positions, velocities, kept = (rows(part, plan.rows) for part in (parts.positions, parts.velocities, parts.accelerations))
-    targets = [*(kept[i] if i < plan.own else None for i in own), *rows(parts.margins, plan.stops), *[None] * len(inputs)]
-    modes = trace.mode_rows((positions[0], velocities[0], kept[0] if kept else ("m", 0)), 1)
+    own, inputs, stops = trace.local_rows, trace.inputs_of_modes, [row("margins", i) for i in range(plan.stops)]
+    targets = [*(row("accelerations", i) if i < plan.own else None for i in own), *stops, *[None] * len(inputs)]
+    modes = trace.mode_rows([plan.slot(part) for part in ("positions", "velocities", "accelerations")], 1)
     margins = motion_roots(trace)[trace.gap is not None :]
-    moving, rates = ([part[i] for i in own] for part in (positions, velocities))
+    moving, rates = ([row(part, i) for i in own] for part in ("positions", "velocities"))
     first_order, length = trace.first_order_rows, SERIES_LENGTH
     layout = Rows(moving, rates, targets, length, any_order=False, first_order=first_order, coordinates=own, modes=modes)
-    leaves = Places(("m", "order"), _leaves(plan, SLOTS.now, parts.position, parts.velocity))
+    leaves = _leaves(plan, SLOTS.now, "position", "velocity")
     expanded = [*(trace.acceleration[i] for i in own), *margins, *inputs]
-    return _function("lane_series", leaves, SeriesOf(layout, tape(expanded, known, series=True)))
+    return _function("lane_series", plan, leaves, SeriesOf(layout, tape(expanded, known, series=True)), "order")
 
 
 def _one_free(trace: Trace, plan: MemoryPlan, known: dict[Expr, int]) -> WrittenFunction:
-    """`lane_one_free(m, order)`: the same series if one coordinate is free, which is in row 0.
+    """`lane_one_free(m, places, order)`: the same series if one coordinate is free, which is in row 0.
 
     The series of `OneFree.curved` are in the rows of the other coordinates, and the guards in the rows of margins.
     """
-    parts = plan.places
-    leaves = _leaves(plan, SLOTS.now, parts.position, parts.velocity)
+    leaves = _leaves(plan, SLOTS.now, "position", "velocity")
     leaves |= {"coordinate": ("m", SLOTS.free_position), "velocity": ("m", SLOTS.free_velocity)}
-    places, equations = Places(("m", "order"), leaves), one_free(trace)
+    equations = one_free(trace)
     if equations is None:
-        return _function("lane_one_free", places, [])
-    guards = [("m", parts.margins + i * SERIES_LENGTH) for i in range(len(equations.guards))]
-    numbers = [("m", parts.constant_guards + i) for i in range(len(equations.constant_guards))]
-    curved = [("m", parts.positions + i * SERIES_LENGTH) for i in range(1, plan.own)]
-    targets = [("m", parts.accelerations), *curved, *guards]
-    state = [("m", parts.positions)], [("m", parts.velocities)]
+        return _function("lane_one_free", plan, leaves, [], "order")
+    guards = [plan.slot("margins", i * SERIES_LENGTH) for i in range(len(equations.guards))]
+    numbers = [plan.slot("constant_guards", i) for i in range(len(equations.constant_guards))]
+    curved = [plan.slot("positions", i * SERIES_LENGTH) for i in range(1, plan.own)]
+    targets = [plan.slot("accelerations"), *curved, *guards]
+    state = [plan.slot("positions")], [plan.slot("velocities")]
     rows = Rows(*state, targets, SERIES_LENGTH, any_order=False, numbers=numbers)
-    return _function("lane_one_free", places, SeriesOf(rows, tape(equations.roots, known, series=True)))
+    return _function("lane_one_free", plan, leaves, SeriesOf(rows, tape(equations.roots, known, series=True)), "order")
 
 
 def _impact(trace: Trace, plan: MemoryPlan, known: dict[Expr, int]) -> WrittenFunction:
-    """`lane_impact(m)`: the side, positions and velocities after an impact at the new state, the tangent's columns included.
+    """`lane_impact(m, places)`: the side, positions and velocities after an impact at the new state, the tangent's columns
+    included.
 
     For a model with several contacts it fills only the mass matrix and E at the new state.
     """
-    parts = plan.places
     if trace.several:
-        entries = {parts.mass: trace.mass, parts.restitution: trace.restitution}
-        filled = {("m", part + i): root for part, roots in entries.items() for i, root in enumerate(roots)}
+        entries = {"mass": trace.mass, "restitution": trace.restitution}
+        filled = {plan.slot(part, i): root for part, roots in entries.items() for i, root in enumerate(roots)}
         if trace.modes is not None:  # the lanes' memory is made of zeros
             filled = {place: root for place, root in filled.items() if root is not number(0.0)}
         return _at_new_state("lane_impact", plan, filled, known)
@@ -264,19 +266,22 @@ def _impact(trace: Trace, plan: MemoryPlan, known: dict[Expr, int]) -> WrittenFu
     if trace.columns:
         jump = saltation(trace)
         positions, velocities = positions + jump.coordinate, velocities + jump.velocity
-    results = {("m", SLOTS.new_side): trace.next_side}
-    for part, rows in ((parts.after_position, positions), (parts.after_velocity, velocities)):
-        results |= {("m", part + row): root for row, root in enumerate(rows)}
+    results: dict[Slot, Expr] = {("m", SLOTS.new_side): trace.next_side}
+    for part, rows in (("after_position", positions), ("after_velocity", velocities)):
+        results |= {plan.slot(part, row): root for row, root in enumerate(rows)}
     return _at_new_state("lane_impact", plan, results, known)
 
 
 def _field(trace: Trace, plan: MemoryPlan, known: dict[Expr, int]) -> WrittenFunction:
-    """`lane_field(m)`: the accelerations at the new state, in the place of the velocities after an impact."""
-    first = plan.places.after_velocity
-    fields = {("m", first + row): trace.written_out(a) for row, a in enumerate(trace.acceleration)}
+    """`lane_field(m, places)`: the model's own accelerations at the new state, in the place of the velocities after an impact.
+
+    They are needed for derivatives and where steps are checked; otherwise nothing is written.
+    """
+    own = trace.acceleration[: trace.dof] if trace.columns or is_steep(trace.acceleration) else []
+    fields = {plan.slot("after_velocity", row): trace.written_out(a) for row, a in enumerate(own)}
     return _at_new_state("lane_field", plan, fields, known)
 
 
-def _at_new_state(name: str, plan: MemoryPlan, results: dict[tuple[str, int], Expr], known: dict[Expr, int]) -> WrittenFunction:
-    places = Places(("m",), _leaves(plan, SLOTS.new_time, plan.places.new_position, plan.places.new_velocity))
-    return _function(name, places, [Case(tape(list(results.values()), known), list(results))])
+def _at_new_state(name: str, plan: MemoryPlan, results: dict[Slot, Expr], known: dict[Expr, int]) -> WrittenFunction:
+    leaves = _leaves(plan, SLOTS.new_time, "new_position", "new_velocity")
+    return _function(name, plan, leaves, [Case(tape(list(results.values()), known), list(results))])

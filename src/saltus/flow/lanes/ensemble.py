@@ -151,7 +151,7 @@ def run_ensemble(
 
 def compiled_lanes(system: System, run: Program, options: EnsembleOptions, kept: int) -> Lanes:
     """The compiled lanes of a system, with the settings for the samples that they keep of each trajectory."""
-    key = run.structure.functions  # their addresses
+    key = run.structure.functions, run.structure.sizes  # their addresses, which structures of different sizes may share
     if key not in _functions:
         _functions[key] = load_lane_functions(run.trace)
     plan, functions = _functions[key]
@@ -170,7 +170,7 @@ def compiled_lanes(system: System, run: Program, options: EnsembleOptions, kept:
     )
 
 
-_functions: dict[tuple[int, ...], Any] = {}
+_functions: dict[tuple[Any, ...], Any] = {}
 
 
 def _jobs(system: System, run: Program, inputs: Inputs, periods: float | None, duration: float | None, side: int) -> Jobs:

@@ -273,7 +273,7 @@ def write_rates(lane):
     lanes.new_time = lanes.now
     for row in range(2 * lane.sizes.rows):
         lanes.new_position[row] = lanes.position[row]
-    field(lane.memory)
+    field(lane.memory, lane.places)
     for row in range(own):
         rates[row] = lane.after_velocity[row]
     for j in range(lane.sizes.columns):

@@ -49,8 +49,8 @@ def _records(dtype: np.dtype[Any]) -> Any:
     return types.Array(from_dtype(dtype), 1, "C")
 
 
-LANE_SERIES = LANE_ONE_FREE = types.void(_f1, _i)  # memory of the lanes, order
-LANE_IMPACT = LANE_FIELD = types.void(_f1)
+LANE_SERIES = LANE_ONE_FREE = types.void(_f1, _i1, _i)  # memory of the lanes, the first slots of its parts, order
+LANE_IMPACT = LANE_FIELD = types.void(_f1, _i1)
 TURNING_RANGE = types.UniTuple(_f, 2)(_f1, _i, _f, _f, _f1)
 TABLES = types.Tuple((_f2, _f4))
 _LIMITS = types.Tuple((_f, _f, _f, types.UniTuple(_f, 4)))

@@ -285,7 +285,7 @@ def series_true(lanes, h, size):
 
     The new state must be in place. See `steps.leaps`.
     """
-    lanes.code.field(lanes.memory)
+    lanes.code.field(lanes.memory, lanes.places)
     defect = splat(0.0)
     for row in range(lanes.sizes.own):
         first_order = row >= lanes.sizes.own - lanes.sizes.first_order

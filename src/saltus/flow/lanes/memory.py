@@ -16,6 +16,8 @@ import numpy as np
 from saltus.flow.kernel.layout import SERIES_LENGTH
 from saltus.taylor import RECORD_WIDTH
 
+Slot = tuple[str, int]  # an array of the memory, and one of its slots
+
 
 class Slots(NamedTuple):
     """The slots that every structure has, by their places."""
@@ -119,6 +121,10 @@ class MemoryPlan:
         sizes += [self.constant_guards, self.constants + self.data, self.records * RECORD_WIDTH]
         sizes += [rows * SERIES_LENGTH for rows in (self.rows, self.rows, self.own, self.stops)]
         return Parts(*(len(SLOTS) + sum(sizes[:part]) for part in range(len(sizes))))
+
+    def slot(self, part: str, number: int = 0) -> Slot:
+        """A slot of a part, for the functions of a structure: the number of modes moves the parts, and is no part of the code."""
+        return (part, number) if self.data else ("m", getattr(self.places, part) + number)
 
     @property
     def end(self) -> int:

@@ -46,7 +46,7 @@ def propose(lanes):
     Returns bits of the lanes that hit, bits for the scalar kernel, bits of the lanes that wait for a shorter step, and the step.
     """
     series = lanes.code.series
-    series(lanes.memory, lanes.sizes.order)
+    series(lanes.memory, lanes.places, lanes.sizes.order)
     size, share, now, limit = state_size(lanes), lanes.step_share, lanes.now, lanes.step_limit
     natural = share * natural_step(lanes, size)
     h = minimum(natural, limit - now)
@@ -82,7 +82,7 @@ def reset(lanes, hit):
     """Apply the reset at the new state. Returns bits of the lanes that are resolved, bits for the scalar kernel, and bits of
     those that are captured."""
     impact = lanes.code.impact
-    impact(lanes.memory)
+    impact(lanes.memory, lanes.places)
     approach = rate_on(lanes, lanes.side) * lanes.new_velocity[0]
     speed = rate_on(lanes, lanes.new_side) * lanes.after_velocity[0]
     good = bits(approach < 0.0) & bits(speed > CHATTER_SPEED) & hit
@@ -103,10 +103,10 @@ def loses_nothing(lanes, speed):
     for _ in range(2):
         lanes.side = lanes.new_side
         lanes.new_velocity[0] = -lanes.after_velocity[0]
-        impact(lanes.memory)
+        impact(lanes.memory, lanes.places)
     loss = speed - rate_on(lanes, lanes.new_side) * lanes.after_velocity[0]
     lanes.side, lanes.new_velocity[0] = side, before
-    impact(lanes.memory)
+    impact(lanes.memory, lanes.places)
     return bits(absolute(loss) < LOSSLESS * speed)
 
 
