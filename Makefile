@@ -30,7 +30,7 @@ reproduce: $(READY)
 # On a new machine the compiler and the type checker, of one core each, work beside one another.
 test: $(TEST_READY)
 	@$(BIN)/python tests/compile_first.py & $(MAKE) --no-print-directory lint; passed=$$?; wait; exit $$passed
-	$(BIN)/python -m pytest --assert=plain || { $(BIN)/python -m pytest --last-failed; exit 1; }
+	$(BIN)/python -m pytest --assert=plain || { $(BIN)/python -m pytest --last-failed --last-failed-no-failures none; exit 1; }
 
 thorough: $(TEST_READY)
 	$(BIN)/python -m pytest -m thorough
