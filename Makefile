@@ -26,11 +26,12 @@ help:
 reproduce: $(READY)
 	$(BIN)/saltus reproduce
 
-# Assertions that explain themselves take twelve seconds of each process to prepare: only what has failed is run again with them.
+# Assertions that explain themselves take twelve seconds of each process to prepare: only what has failed is run again with them,
+# in one process, as it ends where a file cannot be read instead of running all others again.
 # On a new machine the compiler and the type checker, of one core each, work beside one another.
 test: $(TEST_READY)
 	@$(BIN)/python tests/compile_first.py & $(MAKE) --no-print-directory lint; passed=$$?; wait; exit $$passed
-	$(BIN)/python -m pytest --assert=plain || { $(BIN)/python -m pytest --last-failed --last-failed-no-failures none; exit 1; }
+	$(BIN)/python -m pytest --assert=plain || { $(BIN)/python -m pytest -n 0 --last-failed --last-failed-no-failures none; exit 1; }
 
 thorough: $(TEST_READY)
 	$(BIN)/python -m pytest -m thorough

@@ -392,6 +392,13 @@ LONGEST = {
     "beam_on_stop.py",
     "identification.py",
     "overturning_spectrum.py",
+    "rubbing_absorber.py",
+    "stribeck.py",
+    "preloaded_stop.py",
+    "backlash.py",
+    "design_grid.py",
+    "cell_chain.py",
+    "shaken_table.py",
 }  # seconds each; the gallery of `make docs` runs all of them
 
 

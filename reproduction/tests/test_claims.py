@@ -25,7 +25,7 @@ ELSEWHERE = (
     "chain",
 )  # the last two are computed, judged and drawn in test_smoothing_study.py and test_chain.py
 # Fewer values along an axis: reproduction/tests/test_both_layers.py has the loads on both sides of the one that its claim names.
-COARSE = {"both_layers": {"size": 5}}
+COARSE = {"both_layers": {"size": 3}}
 # Those of sections 2 to 5 and of the appendix; from 29 on they are our own (docs/errata.md).
 ERRATA = {*range(1, 22), 23, 25, 26, 27, 29, 40}
 

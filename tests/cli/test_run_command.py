@@ -226,7 +226,7 @@ def test_a_scheduler_that_is_of_no_use_is_refused(address, asks, problem, refuse
 
 # --- a real process ----------------------------------------------------------------------------------------------------------
 
-LONG_CHART = "[stability_chart]\nhorizontal = [0, 0.3]\nvertical = { from = -1, to = -0.1, count = 16 }\nrows = 1\n"
+LONG_CHART = "[stability_chart]\nhorizontal = [0, 0.3]\nvertical = { from = -1, to = -0.1, count = 16 }\nrows = 1\nstarts = 6\n"
 
 
 def test_an_interrupted_chart_goes_on_where_it_was(started, saltus, study, tmp_path):
@@ -248,7 +248,7 @@ def test_an_interrupted_chart_goes_on_where_it_was(started, saltus, study, tmp_p
     assert saltus("run", path, "-o", tmp_path / "out", "--no-plot").exit_code == 0
     assert status(store).complete
     assert {file: file.read_bytes() for file in kept} == kept
-    whole = stability_chart(load_study(path).system, horizontal=[0.0, 0.3], vertical=np.linspace(-1, -0.1, 16), rows=1)
+    whole = stability_chart(load_study(path).system, horizontal=[0.0, 0.3], vertical=np.linspace(-1, -0.1, 16), rows=1, starts=6)
     np.testing.assert_array_equal(open_store(store)["amplitude"], whole["amplitude"])
 
 

@@ -332,7 +332,7 @@ junk = st.one_of(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(
     st.sampled_from(
         ["theta", "velocity", "time", "parameters", "tol", "side", "sample", "last", "until", "sensitivities", "threads"]

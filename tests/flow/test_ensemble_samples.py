@@ -39,7 +39,10 @@ def extrema(motion, begin, end):
     return values.max(), values.min()
 
 
-@pytest.mark.parametrize("family", ["paper", "every_channel", "wall", "duffing", "rocking"])
+@pytest.mark.parametrize(
+    "family",
+    ["paper", "wall", "rocking", *(pytest.param(each, marks=pytest.mark.thorough) for each in ("every_channel", "duffing"))],
+)
 def test_samples_are_those_of_the_dense_output(family):
     """Of every forcing period from the start, and of the part of one in which a margin ends the motion."""
     cases = long_cases(family, 40)

@@ -13,7 +13,7 @@ from saltus.errors import MotionError
 from saltus.flow import EventKind, Stop, simulate
 from saltus.systems import EnergyRestitution, Harmonic, Load, Metainterface, System, VelocityReduction
 
-CHUNKS, CHUNK = 4, 2500
+CHUNKS, CHUNK = 10, 1000
 SLOWEST = 20.0  # seconds: a motion that takes longer hangs
 
 

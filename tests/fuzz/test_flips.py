@@ -85,7 +85,7 @@ def asked_again(folder):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("count", [50, pytest.param(THOROUGH, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("count", [20, pytest.param(THOROUGH, marks=pytest.mark.thorough)])
 def test_a_flipped_bit_is_noticed_or_harmless(results, tmp_path, monkeypatch, kind, count):
     from saltus.sweep import execution
 

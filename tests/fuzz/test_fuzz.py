@@ -113,7 +113,7 @@ def results(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize(("count", "piece"), [(100, 0), *PIECES[1:]])
+@pytest.mark.parametrize(("count", "piece"), [(40, 0), *PIECES[1:]])
 def test_damaged_results(results, tmp_path, count, piece):
     """A file of a store or a netCDF file is damaged: `status` and `plot` say so, or what is read is as it was."""
     from saltus.config import open_result

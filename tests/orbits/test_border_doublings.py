@@ -99,6 +99,7 @@ def test_a_doubling_at_a_jump_is_where_the_slopes_of_direct_motions_lie_on_both_
     assert min(slope(1.0), slope(-1.0)) < -1.0 < max(slope(1.0), slope(-1.0))
 
 
+@pytest.mark.thorough
 def test_what_is_born_there_is_what_direct_motions_end_on(parent: saltus.Branch) -> None:
     """The doubled orbit, and not the orbit itself gone round twice."""
     (point,) = (point for point in parent.special if point.kind == "PD")

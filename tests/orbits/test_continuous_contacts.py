@@ -19,6 +19,9 @@ CASES = {
 every_case = pytest.mark.parametrize(
     "name", [pytest.param(name, marks=pytest.mark.thorough if name == "spring" else ()) for name in CASES]
 )
+shortest_case = pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name == "softer beyond" else pytest.mark.thorough) for name in CASES]
+)
 
 
 @cache
@@ -57,7 +60,7 @@ def test_multipliers_at_a_grazing_are_those_of_the_variational_equation(name):
         assert np.prod(orbit.multipliers).real == pytest.approx(np.linalg.det(derivative), abs=1e-6)
 
 
-@every_case
+@shortest_case
 def test_multipliers_along_the_branch_are_those_of_the_variational_equation(name):
     points = [p for p in mapped(name) if min(p[0].orbit.clearance, p[0].orbit.shallowest) > 1e-6]
     for point, end, derivative in points[:: len(points) // 25]:
@@ -68,7 +71,7 @@ def test_multipliers_along_the_branch_are_those_of_the_variational_equation(name
         assert trace == pytest.approx(np.trace(derivative), abs=1e-6 * (1 + abs(trace)))
 
 
-@every_case
+@shortest_case
 def test_marks_are_the_same_at_other_steps(name):
     """To 1e-8, except grazings of the order in which rounding of the depth, 1e-16, moves them."""
     known = marks(branch_of(name))
@@ -78,7 +81,7 @@ def test_marks_are_the_same_at_other_steps(name):
         assert [value for _, value in found] == pytest.approx([value for _, value in known], abs=1e-8)
 
 
-@every_case
+@shortest_case
 def test_the_branch_has_the_special_points_that_a_shooting_method_of_another_integrator_shows_and_no_others(name):
     """det(M - 1) and det(M + 1) of DOP853 vanish at LP and PD, and change sign along the branch as often as there are such."""
     branch = branch_of(name)

@@ -56,6 +56,7 @@ def test_chaos_begins_where_the_stable_orbit_grazes(branches, bands):
     assert lower.outer <= grazing <= lower.inner
 
 
+@pytest.mark.thorough
 def test_the_other_end_of_the_chaos_is_a_cascade(branches, bands):
     upper = max(bands, key=lambda band: band.high - band.low).upper
     doublings = [point.parameter for point in turning_points(branches) if point.kind == SpecialKind.PD]

@@ -80,7 +80,9 @@ def linear(pulse):
     return saltus.overturning_spectrum(shaken(pulse), amplitude=np.linspace(1.0, 6.0, 11), frequency=np.linspace(1.5, 4.0, 6))
 
 
-@pytest.mark.parametrize(("pulse", "impacts"), [(HalfSine, 0), (OneSine, 0), (OneSine, 1)])
+@pytest.mark.parametrize(
+    ("pulse", "impacts"), [(HalfSine, 0), pytest.param(OneSine, 0, marks=pytest.mark.thorough), (OneSine, 1)]
+)
 def test_borders_of_the_linear_block_are_those_of_the_closed_form(pulse, impacts):
     """Zhang and Makris (2001), Dimitrakopoulos and DeJong (2012): overturning without an impact and after one."""
     data = linear(pulse)

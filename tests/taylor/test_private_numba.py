@@ -99,10 +99,18 @@ def test_a_tuple_by_reference_has_the_tuples_values_and_a_function_is_compiled_o
     assert len(made.element.overloads) == 2  # of a tuple, and by reference, for every i
 
 
+WITHOUT = [("NUMBA_DISABLE_JIT", "1"), ("NUMBA_NUM_THREADS", "0"), ("NUMBA_NUM_THREADS", "two")]
+COMMANDS = ["simulate", "run", "doctor"]
+
+
 @pytest.mark.parametrize(
-    ("name", "value"), [("NUMBA_DISABLE_JIT", "1"), ("NUMBA_NUM_THREADS", "0"), ("NUMBA_NUM_THREADS", "two")]
+    ("name", "value", "command"),
+    [  # each once; all pairs are thorough, as each is a process of its own
+        pytest.param(*each, command, marks=() if i == j else pytest.mark.thorough)
+        for i, each in enumerate(WITHOUT)
+        for j, command in enumerate(COMMANDS)
+    ],
 )
-@pytest.mark.parametrize("command", ["simulate", "run", "doctor"])
 def test_an_environment_without_a_compiler_is_refused_in_a_sentence(name, value, command, tmp_path):
     study = SOURCE.parent / "examples" / "metainterface.toml"
     arguments = [] if command == "doctor" else [study, "--output", tmp_path / "results"]
@@ -183,7 +191,11 @@ PARTS = {  # and the methods of each that are called, or replaced in a class tha
     "CompilerBase": ["__init__", "compile_extra"],
     "DefaultPassBuilder": ["define_nopython_pipeline"],
 }
-CHANGES = [(part, how) for part, methods in PARTS.items() for how in ("absent", "a function", *methods)]
+CHANGES = [  # absent, and with another method; the other ways are thorough, as functions are compiled anew for each
+    pytest.param(part, how, marks=() if how in ("absent", *methods[-1:]) else pytest.mark.thorough)
+    for part, methods in PARTS.items()
+    for how in ("absent", "a function", *methods)
+]
 
 
 @pytest.fixture
