@@ -63,6 +63,15 @@ def stops() -> Any:
 
 
 @cache
+def belt() -> Any:
+    """A mass on a belt, which sticks and slides, under a force."""
+    import saltus
+
+    load = saltus.Load(frequency=1.3, force=saltus.Harmonic(amplitude=0.4))
+    return saltus.System(model=saltus.BeltOscillator(kinetic=0.2, static=0.3, belt_speed=0.3), load=load)
+
+
+@cache
 def orbit() -> Any:
     """Where the branch begins."""
     import saltus
@@ -134,6 +143,22 @@ def both_layers() -> None:
         saltus.simulate(layers(), theta_1=0.1 + 0.01 * n, theta_2=-0.05, velocity=(0.0, 0.0), periods=200, dense=False)
 
 
+def two_stops() -> None:
+    """Motions between two stops over 200 periods."""
+    import saltus
+
+    for n in range(5):
+        saltus.simulate(stops(), x=0.1 + 0.01 * n, periods=200, dense=False)
+
+
+def on_a_belt() -> None:
+    """Motions on a belt over 200 periods."""
+    import saltus
+
+    for n in range(5):
+        saltus.simulate(belt(), x=0.1 + 0.01 * n, periods=200, dense=False)
+
+
 def lanes_of_layers() -> None:
     """128 motions of both layers over 20 periods."""
     import numpy as np
@@ -160,6 +185,8 @@ TASKS: dict[str, Callable[[], None]] = {
     "a branch": branch,
     "a branch of both layers": branch_of_layers,
     "both layers": both_layers,
+    "two stops": two_stops,
+    "a belt with friction": on_a_belt,
     "lanes of both layers, 128 motions": lanes_of_layers,
     "two stops with sensitivities": sensitivities,
 }
