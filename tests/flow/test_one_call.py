@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from shared_systems import forced
 
-from saltus import Harmonic, Load, Model, NewtonImpact, ParameterError, System, TwoLayer, simulate
+from saltus import Harmonic, Load, Model, NewtonImpact, ParameterError, System, TwoLayer, WallOscillator, simulate
 
 LAYERS = System(
     model=TwoLayer(beta0=1.4, damping=0.1, mass_ratio=0.2),
@@ -100,6 +100,53 @@ def test_threads_share_a_system_and_not_what_the_kernel_writes():
     assert np.array_equal(alone, together)
 
 
+STARTS = [(0.3, 0.0), (0.3, -0.4), (-0.2, 0.1), (0.0, 0.2), (0.0, 0.0), (1e-9, 0.0), (7.0, 0.0), (0.3, 0)]
+SYSTEMS = {
+    "lossless": (forced(), {}),
+    "comes to rest": (forced(H=0.1, e=0.5), {}),
+    "ends at a limit": (forced(), {"stop_at": ("kinematic_limit",)}),
+    "without a load": (System(model=WallOscillator(wall=10.0, damping=0.1), load=Load()), {}),
+    "without a contact": None,
+}
+
+
+@pytest.mark.filterwarnings("ignore:.*radians:UserWarning")
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_a_motion_that_is_asked_for_again_is_the_same(name):
+    """The third motion of a system from any start takes a shorter way through Python."""
+    system, more = SYSTEMS[name] or (System(model=Global()), {})
+    coordinate = system.model.coordinates[0]
+    more = more | ({"periods": 7} if system.load.period else {"duration": 40.0})
+
+    def motion(start, whose):
+        return simulate(whose, **{coordinate: start[0]}, velocity=start[1], dense=False, **more)
+
+    for start in [*STARTS, *STARTS]:
+        first, again = motion(start, system.with_()), motion(start, system)
+        one, other = ({key: x for key, x in vars(m).items() if key not in ("system", "events")} for m in (first, again))
+        assert one == other
+        assert len(first.events) == len(again.events)
+        assert all(a == b for a, b in zip(first.events, again.events, strict=True))
+    names = calls(lambda: motion(STARTS[1], system))
+    assert ("MotionRequest.__init__" in names) == (name == "ends at a limit")
+
+
+def test_what_is_wrong_is_refused_however_often_a_system_was_followed():
+    system = forced()
+    for _ in range(4):
+        simulate(system, theta=0.3, periods=1, dense=False)
+    for wrong, word in (({"theta": math.nan}, "theta"), ({"tehta": 0.3}, "theta"), ({"theta": 0.3, "x": 1.0}, "'x'")):
+        with pytest.raises(ParameterError, match=word):
+            simulate(system, periods=1, dense=False, **wrong)
+    with pytest.raises(ParameterError, match="velocity"):
+        simulate(system, theta=0.3, velocity=math.inf, periods=1, dense=False)
+    wall = System(model=WallOscillator(), load=Load())
+    for _ in range(4):
+        simulate(wall, x=-0.5, duration=1.0, dense=False)
+    with pytest.raises(ParameterError, match="beyond the contact"):
+        simulate(wall, x=9.0, duration=1.0, dense=False)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Global(Model):
     """x'' = - stiffness x, with the number of this module."""
@@ -127,6 +174,10 @@ def test_a_number_that_a_model_reads_from_its_module_is_read_at_every_call(monke
     assert simulate(system, x=1.0, duration=1.0).x == pytest.approx(np.cos(1.0), abs=1e-12)
     monkeypatch.setattr(sys.modules[__name__], "stiffness", 4.0)
     assert simulate(system, x=1.0, duration=1.0).x == pytest.approx(np.cos(2.0), abs=1e-12)
+    for _ in range(4):
+        simulate(system, x=1.0, duration=1.0, dense=False)
+    monkeypatch.setattr(sys.modules[__name__], "stiffness", 1.0)
+    assert simulate(system, x=1.0, duration=1.0, dense=False).x == pytest.approx(np.cos(1.0), abs=1e-12)
 
 
 def test_nothing_is_kept_of_a_system_that_can_change():

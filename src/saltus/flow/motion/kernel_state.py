@@ -3,7 +3,8 @@ fills: all steps of the motion, the states at given times, or its events alone."
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any
@@ -14,10 +15,10 @@ from saltus.checks import LIMITS, free_memory
 from saltus.errors import MotionError, ParameterError
 from saltus.flow.contacts.layout import ContactColumn, FrictionColumn, NoMargin
 from saltus.flow.kernel.compiled import Program, load_contacts_kernel, load_kernel, taylor_order
-from saltus.flow.kernel.layout import EventCode, Mode, side_of_state
-from saltus.flow.kernel.memory import AT_START, WHOLE_RECORD, EventBuffers, MotionNumbers, StepBuffers, motion_record
-from saltus.flow.motion.events import ContactEvents, MotionEvents
-from saltus.flow.motion.motion import Samples
+from saltus.flow.kernel.layout import EventCode, Mode, Status, side_of_state
+from saltus.flow.kernel.memory import AT_START, MOTION, WHOLE_RECORD, EventBuffers, MotionNumbers, StepBuffers, motion_record
+from saltus.flow.motion.events import ContactEvents, MotionEvents, Stop
+from saltus.flow.motion.motion import Motion, Samples, motion_of
 from saltus.flow.motion.validity import DenseOutput, Validity, ValidityCheck
 
 if TYPE_CHECKING:
@@ -91,6 +92,62 @@ def time_of(numbers: Any) -> float:
     """The dimensionless time of a motion with these numbers."""
     time: float = numbers.period * numbers.period_length + numbers.time
     return time
+
+
+Again = Callable[[Mapping[str, Any], Any], Motion | None]  # of coordinates and velocity, as `simulate` takes them
+
+
+def remember(request: MotionRequest, run: Program) -> None:
+    """Let the plan of a request keep a way to make its motion from other starts, once it has been asked for twice: in loops of
+    users all but the start is the same, and the rest of Python takes four times as long as the kernel for a forcing period.
+
+    Only the events of these motions are kept, and their systems have one coordinate and at most one contact. Where one call of
+    the kernel is not enough there is no motion: `follow` makes it then, or refuses it.
+    """
+    kept, system, structure, breaks = request.plan.again, request.system, run.structure, run.env[2]
+    if not kept:
+        kept.append(None)
+        return
+    sizes, own = structure.sizes, request.given is system and breaks.size == 0 and not structure.several
+    if kept[0] is not None or not own or (sizes.own, sizes.columns, sizes.first_order) != (1, 0, 0):
+        return
+    name, kernel, env, model = system.model.coordinates[0], load_kernel(), run.env, run.model
+    blank, buffers = bytes(KernelState(request, run)._memory), Recorder(request, run, taylor_order(request.tol))
+    local, first, _, _, *rest = AT_START.unpack_from(blank)
+    size, steps, geometry = len(buffers.events.event_labels), buffers.steps, model.geometry.tolist()
+    most = 2.0 * math.pi if request.plan.angles else np.inf  # beyond it `simulate` warns
+    same = {"system": system, "tol": request.tol, "start": request.time}
+    same |= dict.fromkeys(("limit", "dense", "kept", "sampled_validity"))
+
+    def motion(coordinates: Mapping[str, Any], velocity: Any) -> Motion | None:
+        value = coordinates.get(name)
+        if type(value) is not float or type(velocity) is not float or len(coordinates) > 1:
+            return None
+        mode, side = side_of_state(sizes.sides, value, velocity, geometry)
+        if mode == Mode.BEYOND or not (abs(value) <= min(most, LIMITS.value) and abs(velocity) <= LIMITS.value):
+            return None
+        memory, state = bytearray(blank), np.array((value, velocity))
+        AT_START.pack_into(memory, 0, local, first, mode, side, *rest)
+        labels, values = events = EventBuffers(np.empty((size, 4), dtype=np.int64), np.empty((size, 3)))
+        if kernel(np.ndarray((1,), MOTION, memory), state, env, model, NO_ROWS, (steps, events)) != Status.DONE:
+            kept.clear()
+            return None
+        now: Any = MotionNumbers._make(WHOLE_RECORD.unpack(memory))
+        position, speed = state.tolist()
+        count, mode = now.recorded_events, now.mode
+        return motion_of(
+            **same,
+            time=time_of(now),
+            position=position,
+            velocity=speed,
+            side=0 if mode in (Mode.REST, Mode.CHATTER) else now.side,
+            stop=Stop.REST if mode == Mode.REST else Stop.HORIZON,
+            chatter_speed=now.chatter_speed if mode == Mode.CHATTER else None,
+            periods=now.period,
+            events=MotionEvents(now.period_length, labels[:count], values[:count]),
+        )
+
+    kept[:] = [motion]
 
 
 def _first_state(run: Program, start: np.ndarray) -> np.ndarray:
@@ -284,6 +341,11 @@ class Recorder:
         times = self._times[self._next : stop]
         self._samples.append((times, *piece.states(times)))
         self._next = max(stop, self._next)
+
+    @property
+    def is_short(self) -> bool:
+        """Whether the events of the motion alone are kept, and were in the buffers of one call of the kernel."""
+        return self._drops and len(self._events) == 1
 
     def last_hit(self) -> list[int]:
         """The contacts, by number, that the impacts in the last buffer closed."""

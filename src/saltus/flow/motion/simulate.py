@@ -14,7 +14,7 @@ from saltus.errors import MotionError, ParameterError
 from saltus.flow.kernel.compiled import Program, known_program, limits_of, taylor_order
 from saltus.flow.kernel.layout import Mode, Status
 from saltus.flow.motion.events import Stop
-from saltus.flow.motion.kernel_state import MOST, ContactState, KernelState, Recorder, time_of
+from saltus.flow.motion.kernel_state import MOST, Again, ContactState, KernelState, Recorder, remember, time_of
 from saltus.flow.motion.motion import Motion, in_own_coordinates, motion_of
 from saltus.flow.motion.validity import DenseOutput
 from saltus.progress import Progress, silent
@@ -79,6 +79,7 @@ class MotionPlan(NamedTuple):
     limits: tuple[str, ...]
     clock: Clock
     angles: list[tuple[int, str]]  # the coordinates that are angles, each with its place
+    again: list[Again | None]  # how the motion is made from other starts (`remember`)
 
 
 class MotionRequest:
@@ -124,8 +125,9 @@ class MotionRequest:
         structure_key(system)  # what a system remembers is forgotten where values that its classes read have changed
         start = read_start(system, velocity, coordinates, NAMES[sensitivities is not None], time)
         self.given, self.system = system, system.in_gap_coordinates
-        _, self.limits, self.clock, angles = _plan(system, (periods, duration, tol, time, side, stop_at, dense, times is None))
-        for i, name in angles:
+        self.plan = _plan(system, (periods, duration, tol, time, side, stop_at, dense, times is None))
+        self.limits, self.clock = self.plan.limits, self.plan.clock
+        for i, name in self.plan.angles:
             notice_degrees(name, start.item(i))
         self.time, self.tol = float(time), float(tol)
         self.start = start
@@ -154,7 +156,7 @@ def _plan(system: System, asked: tuple[Any, ...]) -> MotionPlan:
     when = Clock(int(first), float(local), int(last_one), float(end), float(length))
     if dense and whole:
         _check_dense(when, periods, duration)
-    made = MotionPlan(asked, limits, when, _angles(system))
+    made = MotionPlan(asked, limits, when, _angles(system), [])
     last[:] = [made] if isinstance(stop_at, (str, tuple)) else []  # others may change
     return made
 
@@ -248,6 +250,9 @@ def simulate(
     >>> f"{motion.theta:.12f} after {len(motion.impacts)} impacts"
     '-0.235680595299 after 39 impacts'
     """
+    asked = periods, duration, tol, time, side, stop_at, dense, times is None
+    if progress is silent and (motion := _like_the_last(system, asked, coordinates, velocity)) is not None:
+        return motion
     request = MotionRequest(
         system=system,
         coordinates=coordinates,
@@ -262,6 +267,17 @@ def simulate(
         times=times,
     )
     return in_own_coordinates(system, follow(request, progress).motion)
+
+
+def _like_the_last(system: Any, asked: tuple[Any, ...], coordinates: Mapping[str, Any], velocity: Any) -> Motion | None:
+    """The motion, if this system was followed before with the same arguments but the start, and kept a way to do it again."""
+    memory = getattr(system, "_memory", None)
+    for plan in memory.get("plan", ()) if memory else ():
+        for again in plan.again:
+            if again is not None and all(map(is_, plan.asked, asked)):
+                structure_key(system)  # as for every motion
+                return again(coordinates, velocity) if system._memory is memory else None
+    return None
 
 
 class Followed(NamedTuple):
@@ -289,10 +305,12 @@ class Followed(NamedTuple):
 
 def follow(request: MotionRequest, progress: Progress, run: Program | None = None) -> Followed:
     """Follow the motion of a request, with its tangent if the request asks for one; `run` is its program, if that is known."""
-    run = run or known_program(request.system, request.limits, request.sensitivities)
-    now = (ContactState if run.structure.several else KernelState)(request, run)
-    recorder = Recorder(request, run, taylor_order(request.tol))
-    status, numbers = _advance(request, run, now, recorder, progress)
+    made = run or known_program(request.system, request.limits, request.sensitivities)
+    now = (ContactState if made.structure.several else KernelState)(request, made)
+    recorder = Recorder(request, made, taylor_order(request.tol))
+    status, numbers = _advance(request, made, now, recorder, progress)
+    if run is None and status == Status.DONE and recorder.is_short:
+        remember(request, made)
     return Followed(_collect(request, now, status, numbers, recorder), now, recorder)
 
 
