@@ -285,6 +285,7 @@ def good(made):
         "UnitCell": (saltus.UnitCell, {"alpha0": 0.3, "beta0": 1.4}),
         "CellChain": (saltus.CellChain, {"beta0": 1.4}),
         "saltus.to_jax": (saltus.to_jax, {"system": SYSTEM, "periods": 1}),
+        "saltus.to_torch": (saltus.to_torch, {"system": SYSTEM, "periods": 1}),
         "saltus.from_sympy": (saltus.from_sympy, {"coordinates": [X], "velocities": [V], "force": [-X], "parameters": {}}),
         **{
             f"UnitCell.{name}": (getattr(CELL, name), {"theta": 0.1})

@@ -39,7 +39,8 @@ from .flow import sensitivities as sensitivities
 from .flow import simulate as simulate
 from .flow import simulate_many as simulate_many
 from .flow import stop_names as stop_names
-from .flow.motion.in_jax import to_jax as to_jax
+from .flow.motion.differentiable import to_jax as to_jax
+from .flow.motion.differentiable import to_torch as to_torch
 from .orbits import Branch as Branch
 from .orbits import PeriodicOrbit as PeriodicOrbit
 from .orbits import SpecialPoint as SpecialPoint

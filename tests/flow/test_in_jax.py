@@ -8,7 +8,7 @@ import pytest
 
 import saltus
 from saltus.errors import ParameterError
-from saltus.flow.motion import in_jax
+from saltus.flow.motion import differentiable
 
 SYSTEM = saltus.System(
     model=saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1),
@@ -78,7 +78,7 @@ def test_a_product_with_the_transpose_is_the_same_from_both_sides(jax):
 @pytest.mark.parametrize("asked", [{"periods": 2}, {"times": [2.0, 9.0]}])
 def test_many_motions_are_those_that_are_followed_alone(jax, asked, monkeypatch):
     together = []
-    monkeypatch.setattr(in_jax, "simulate_many", lambda *a, **b: together.append(b) or saltus.simulate_many(*a, **b))
+    monkeypatch.setattr(differentiable, "simulate_many", lambda *a, **b: together.append(b) or saltus.simulate_many(*a, **b))
     function, starts = saltus.to_jax(SYSTEM, **asked), np.array([[0.3, 0.0], [0.1, 0.2], [-0.2, 0.0]])
     losses = np.array([0.95, 0.9, 0.85])
 

@@ -127,7 +127,7 @@ WITHOUT = {
     **dict.fromkeys(("saltus.to_csv", "saltus.animate", "saltus.page", "saltus.explore"), WRITES),
     "saltus.to_pandas": "gives a table",
     "saltus.from_sympy": "gives a model",
-    "saltus.to_jax": "gives a function",
+    **dict.fromkeys(("saltus.to_jax", "saltus.to_torch"), "gives a function"),
     **dict.fromkeys(("saltus.overturning_spectrum", "saltus.fragility"), "is drawn in tests/studies/test_overturning.py"),
     **dict.fromkeys(("saltus.save", "saltus.show_progress", "sweep.remove_store", "sweep.status"), WRITES),
     **dict.fromkeys(("sweep.open_store", "sweep.run"), STORE),
