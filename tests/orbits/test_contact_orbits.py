@@ -6,9 +6,11 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 import saltus
 from saltus import NewtonImpact, TwoLayer, TwoStops
+from saltus.continuation import CurveEnd
 from saltus.errors import MotionError, ParameterError
 from saltus.orbits import OrbitEnd, SpecialKind, as_json, defects, from_json, orbits_of
 from saltus.systems import Harmonic, Load, Metainterface, System, VelocityReduction
@@ -198,6 +200,79 @@ def test_a_branch_ends_where_one_layer_is_at_its_contact_as_the_other_one_closes
     assert 0.28 < branch.ends[0].parameter < 0.284
     assert branch.ends[0].reason is OrbitEnd.TWO_AT_ONCE
     assert max(orbit.defect for orbit in branch.orbits) < 1e-11
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImpactAbsorber(saltus.ContactModel):
+    """x'' + 2 zeta x' + x = F(tau) + r, eps y'' = -r, with y a ball in a cavity of x: |x - y| <= b."""
+
+    zeta: float = 0.02
+    eps: float = 0.05
+    b: float = 1.0
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x", "y")
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+
+    @property
+    def contacts(self):
+        left = saltus.Contact(name="left", coordinate={"y": 1.0, "x": -1.0}, position=-self.b)
+        return left, saltus.Contact(name="right", coordinate={"x": 1.0, "y": -1.0}, position=-self.b)
+
+    def mass_matrix(self, theta):
+        return (1.0, 0.0), (0.0, self.eps)
+
+    def force(self, t, theta, velocity, load):
+        return load.force(t) - 2.0 * self.zeta * velocity[0] - theta[0], 0.0
+
+
+def absorber(F):
+    return System(model=ImpactAbsorber(), load=Load(frequency=1.0, force=Harmonic(amplitude=F)), impact=NewtonImpact(e=0.65))
+
+
+def fold_of_absorber(zeta=0.02, eps=0.05, b=1.0, e=0.65):
+    """The least F at which the ball hits each side once a period, half a period apart.
+
+    With x = X, x' = u and y = X + b just after one impact, the ball flies at w = -2 (X + b) / pi to the other side, and meets it
+    with all signs changed: these are three linear equations for X, u and F (cos, sin) of the phase, a line of solutions. The fold
+    is its point of least F.
+    """
+    a, T = np.array([[0.0, 1.0], [-1.0, -2.0 * zeta]]), math.pi
+    half = expm(a * T)
+    steady = np.array([[0.0, -0.5 / zeta], [0.5 / zeta, 0.0]])  # x and x' under F_c cos + F_s sin, at phase 0
+    # (x, x')(T) = half ((X, u) - p) - p, p = steady (F_c, F_s), is -(X, u + 2 eps w); and u - w = -e (u + 2 eps w + w)
+    w = np.array([-2.0 / T, 0.0, 0.0, 0.0]), -2.0 * b / T
+    rows = np.hstack([half + np.eye(2), -(half + np.eye(2)) @ steady])
+    rows[1] += 2.0 * eps * w[0]
+    own = np.array([0.0, 1.0 + e, 0.0, 0.0]) + (e * (2.0 * eps + 1.0) - 1.0) * w[0]
+    right = -np.array([0.0, 2.0 * eps, e * (2.0 * eps + 1.0) - 1.0]) * w[1]
+    matrix = np.vstack([rows, own])
+    some, way = np.linalg.lstsq(matrix, right, rcond=None)[0][2:], np.linalg.svd(matrix)[2][-1, 2:]
+    return abs(some[0] * way[1] - some[1] * way[0]) / math.hypot(*way)
+
+
+def test_the_branch_of_an_impact_absorber_folds_in_closed_form_and_ends_where_nothing_holds_the_ball():
+    """It is born at F = 2 zeta b, where the motion without impacts just fills the cavity; below, the ball may stand anywhere."""
+    orbit = saltus.find_orbit(absorber(0.05), x=0.0, y=0.0, velocity=(0.0, 0.3))
+    branch = saltus.continue_orbit(orbit, "load.force.amplitude", (0.01, 0.06))
+    fold, born = (next(s for s in branch.special if s.kind == kind) for kind in (SpecialKind.LP, SpecialKind.GR))
+    assert fold.parameter == pytest.approx(fold_of_absorber(), abs=1e-13)
+    assert born.parameter == pytest.approx(0.04, abs=1e-13)
+    end = next(end for end in branch.ends if end.reason is not CurveEnd.BOUND)
+    assert end.reason is OrbitEnd.NOT_ISOLATED
+    assert end.parameter == pytest.approx(0.04, abs=1e-13)
+
+
+def test_an_orbit_is_found_with_a_mass_that_nothing_holds_and_has_no_branch():
+    orbit = saltus.find_orbit(absorber(0.02), x=0.0, y=0.2, velocity=(0.5, 0.0))
+    root = complex(-0.02, math.sqrt(1 - 0.02**2))
+    exact = [1.0, 1.0, *np.exp(2.0 * math.pi * np.array([root, root.conjugate()]))]
+    np.testing.assert_allclose(
+        np.sort_complex(orbit.multipliers), np.sort_complex(exact), rtol=0, atol=1e-7
+    )  # of a double one of a mass that flies freely
+    assert not orbit.isolated
+    assert orbit.amplitude == pytest.approx(0.5, abs=1e-12)
+    with pytest.raises(ParameterError, match="others beside it"):
+        saltus.continue_orbit(orbit, "load.force.amplitude", (0.01, 0.03))
 
 
 def test_an_orbit_survives_a_store():

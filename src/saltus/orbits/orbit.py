@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.checks import LIMITS, check_count
-from saltus.continuation import newton
+from saltus.continuation import NEWTON, newton
 from saltus.errors import MotionError
 from saltus.flow import Motion, SegmentColumn, Validity, simulate
 from saltus.orbits.equations.contract import OrbitEquations, OrbitEvaluation, Solution
@@ -292,6 +292,15 @@ class PeriodicOrbit(Result):
         return not self.equations.passes_contact and min(abs(self.clearance), abs(speed)) < TOLERANCES.touch
 
     @property
+    def isolated(self) -> bool:
+        """Whether no continuum of orbits with the same parameters contains it: there a multiplier is 1 and its equations leave a
+        direction free, as where a mass that nothing holds may stand anywhere."""
+        if (np.abs(self.multipliers - 1.0) > TOLERANCES.isolated).all():
+            return True
+        lengths = np.linalg.svd(self.solution.evaluation.derivatives(), compute_uv=False)
+        return bool(lengths[-1] > NEWTON.converged * lengths[0])
+
+    @property
     def stable(self) -> bool:
         """Whether all multipliers lie inside the unit circle, by more than rounding, and it does not graze: at a fold or a period
         doubling it is not stable."""
@@ -422,13 +431,21 @@ class PeriodicOrbit(Result):
 def solve(
     equations: OrbitEquations, unknowns: np.ndarray, values: np.ndarray, iterations: int = NEWTON_ITERATIONS
 ) -> Solution | None:
-    """The orbit near a first guess at fixed parameters, or None where Newton's method does not converge."""
+    """The orbit near a first guess at fixed parameters, or None where Newton's method does not converge.
+
+    Where the equations leave a direction free, as where a mass that nothing holds may stand anywhere, it keeps its place in it.
+    """
 
     def evaluate(place: np.ndarray, thorough: bool) -> OrbitEvaluation | None:
         return equations.evaluate(place, values, with_extremes=thorough)
 
     def linear(found: OrbitEvaluation, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return found.jacobian(), -found.residual
+        matrix = found.jacobian()
+        if np.isfinite(matrix).all():
+            left, lengths, right = np.linalg.svd(matrix)
+            free = lengths <= NEWTON.converged * lengths[0]
+            matrix += left[:, free] @ right[free]
+        return matrix, -found.residual
 
     found = newton(evaluate, linear, unknowns, iterations)
     return None if found is None else Solution(found.place, values, found.evaluation, found.iterations)

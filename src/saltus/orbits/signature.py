@@ -146,6 +146,9 @@ class OrbitTolerances:
     release: float = 1e-9  # Instants of a release, in forcing periods: releases are isolated, and known to rounding.
     # Moduli of multipliers on the unit circle: those without damping, and at a special point that is located to rounding.
     on_circle: float = 1e-9
+    # Only with a multiplier this near to 1 may an orbit belong to a continuum of orbits at one value of the parameter, such as
+    # those of a mass that no wall and no spring holds. Near a fold it is as near only within 1e-14 of the fold's parameter.
+    isolated: float = 1e-7
     load: float = 1e-12  # Values of a load and of its mirror image half a period later.
 
 

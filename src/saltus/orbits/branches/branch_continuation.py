@@ -70,7 +70,8 @@ def continue_orbit(
     Raises
     ------
     ParameterError
-        `orbit` is no orbit, the parameter is unknown, the bounds exclude the orbit, or the step is outside [1e-6, 1].
+        `orbit` is none, or not `isolated`; the parameter is unknown, the bounds exclude the orbit, or the step is outside
+        [1e-6, 1].
 
     Examples
     --------
@@ -157,6 +158,12 @@ def along(orbit: PeriodicOrbit, path: str) -> tuple[PeriodicOrbit, bool]:
         found = full_period(found)
     elif symmetric:
         found = half(found) or found
+    if not found.isolated:
+        raise ParameterError(
+            "the orbit has others beside it at the same parameters, as that of a mass which nothing holds: these are no branch; "
+            "begin with an orbit at which it is held or hit",
+            "orbit",
+        )
     return found, symmetric
 
 

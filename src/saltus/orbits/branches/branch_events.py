@@ -176,13 +176,15 @@ class BranchEvents(OrbitEvents):
         return End(OrbitEnd.FIRST, special.parameter, special.kind) if special.kind == self.until else None
 
     def ended(self, run: Run, ahead: OrbitPoint, cut: Cut | None) -> End | None:
-        """The end of an orbit that has shrunk to rest, or has lost its stability."""
+        """The end of an orbit that has shrunk to rest, has lost its stability, or has others beside it at the same parameters."""
         largest = complex_pairs(ahead.orbit).max(initial=0.0)
         if largest > 1.0 + SETTINGS.impossible_pair and never_torus(ahead.orbit):
             where, modulus = ahead.parameters, f"{largest:.9g}"
             run.missed.append(Missed(OrbitMissed.IMPOSSIBLE_PAIR, SpecialKind.NS, where, where, modulus))
         if self.while_stable and cut is None and not ahead.orbit.stable:
             return super().ended(run, ahead, cut) or End(OrbitEnd.UNSTABLE, ahead.parameter)
+        if all(point.orbit.grazes or not point.orbit.isolated for point in run.points[-2:]):  # a branch touches at a point only
+            return End(OrbitEnd.NOT_ISOLATED, run.points[-2:][0].parameter)
         return super().ended(run, ahead, cut)
 
     def across(self, run: Run, cut: Cut) -> OrbitPoint | End:

@@ -100,6 +100,10 @@ class OrbitEnd(EndReason):
     )
     NO_SECTION = "at {parameter:.10g} an event comes to the phase at which the state is given, and no other phase would do"
     STICKS = "from {parameter:.10g} on the mass sticks for good; it may then rest anywhere near that place"
+    NOT_ISOLATED = (
+        "from {parameter:.10g} on an orbit has others beside it at the same parameters, as that of a mass which nothing holds: "
+        "they are no branch"
+    )
     NO_MOTION = "the motion cannot be followed {detail} the grazing"
     NO_DIRECTION = "neither direction after the grazing leads to orbits of the system"
     MEETS_GRAZING = "meets another grazing: {kind}"

@@ -265,10 +265,6 @@ class NearReturnSettings:
     converged: float = 1e-7  # Distance of a state from its image below which it is taken to be on an orbit.
     same_state: float = 1e-5  # States at one value are on the same orbit if they are this near.
     still: float = 1e-6  # An orbit no larger than this, or a motion that stays this near to the contact, is at rest.
-    # An orbit with a multiplier this near to 1 belongs to a continuum of orbits at one value of the parameter, such as those of a
-    # mass that no wall and no spring holds, and has no branch. Near a fold a multiplier is as near to 1 only within 1e-14 of the
-    # fold's parameter.
-    isolated: float = 1e-7
     # With contacts or frictions and more state variables than this, derivatives are computed motion by motion, by the code that
     # branches need as well. The code for lanes would take longer to compile (minutes for four cells).
     in_lanes: int = 4
@@ -306,7 +302,7 @@ def orbits_near_returns(
                 continue
             known[row] = np.concatenate([known[row], state[None]])
             orbit = solved_near(system.with_({path: float(values[row])}), path, state, period)
-            if orbit is not None and _is_isolated(orbit) and not any(same_orbit(orbit, o) for place, o in found if place == row):
+            if orbit is not None and orbit.isolated and not any(same_orbit(orbit, o) for place, o in found if place == row):
                 found.append((row, orbit))
     return [orbit for _, orbit in found]
 
@@ -319,11 +315,6 @@ def solved_near(system: System, path: str, state: np.ndarray, period: int) -> Pe
     except MotionError:
         return None
     return orbit if orbit is not None and orbit.admissible and orbit.amplitude > NEAR_RETURNS.still else None
-
-
-def _is_isolated(orbit: PeriodicOrbit) -> bool:
-    """Whether an orbit is isolated from other orbits at its value of the parameter."""
-    return bool((np.abs(orbit.multipliers - 1.0) > NEAR_RETURNS.isolated).all())
 
 
 def _guesses(states: np.ndarray, period: int) -> np.ndarray:
