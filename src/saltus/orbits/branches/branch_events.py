@@ -183,8 +183,9 @@ class BranchEvents(OrbitEvents):
             run.missed.append(Missed(OrbitMissed.IMPOSSIBLE_PAIR, SpecialKind.NS, where, where, modulus))
         if self.while_stable and cut is None and not ahead.orbit.stable:
             return super().ended(run, ahead, cut) or End(OrbitEnd.UNSTABLE, ahead.parameter)
-        if all(point.orbit.grazes or not point.orbit.isolated for point in run.points[-2:]):  # a branch touches at a point only
-            return End(OrbitEnd.NOT_ISOLATED, run.points[-2:][0].parameter)
+        before = run.points[-2:][0]
+        if not ahead.orbit.isolated and (before.orbit.grazes or not before.orbit.isolated):  # at a crossing one point is as that
+            return End(OrbitEnd.NOT_ISOLATED, before.parameter)
         return super().ended(run, ahead, cut)
 
     def across(self, run: Run, cut: Cut) -> OrbitPoint | End:
