@@ -254,12 +254,13 @@ def test_the_branch_of_an_impact_absorber_folds_in_closed_form_and_ends_where_no
     """It is born at F = 2 zeta b, where the motion without impacts just fills the cavity; below, the ball may stand anywhere."""
     orbit = saltus.find_orbit(absorber(0.05), x=0.0, y=0.0, velocity=(0.0, 0.3))
     branch = saltus.continue_orbit(orbit, "load.force.amplitude", (0.01, 0.06))
-    fold, born = (next(s for s in branch.special if s.kind == kind) for kind in (SpecialKind.LP, SpecialKind.GR))
+    fold = next(s for s in branch.special if s.kind == SpecialKind.LP)
+    born = max(s.parameter for s in branch.special if s.kind == SpecialKind.GR)
     assert fold.parameter == pytest.approx(fold_of_absorber(), abs=1e-13)
-    assert born.parameter == pytest.approx(0.04, abs=1e-13)
+    assert born == pytest.approx(0.04, abs=1e-13)
     end = next(end for end in branch.ends if end.reason is not CurveEnd.BOUND)
     assert end.reason is OrbitEnd.NOT_ISOLATED
-    assert 0.035 < end.parameter < 0.04 + 1e-12  # within the steps after the grazing
+    assert 0.035 < end.parameter < 0.04 + 1e-12  # for a while a ball that is only touched may be followed
 
 
 def test_an_orbit_is_found_with_a_mass_that_nothing_holds_and_has_no_branch():

@@ -293,17 +293,13 @@ class PeriodicOrbit(Result):
 
     @property
     def isolated(self) -> bool:
-        """Whether no continuum of orbits with the same parameters contains it: there a multiplier is 1 and its equations leave a
-        direction free, as where a mass that nothing holds may stand anywhere."""
-        if (np.abs(self.multipliers - 1.0) > TOLERANCES.isolated).all():
-            return True
-        lengths = np.linalg.svd(self.solution.evaluation.derivatives(), compute_uv=False)
-        return bool(lengths[-1] > NEWTON.converged * lengths[0])
+        """Whether no others lie beside it at the same parameters: there a multiplier is 1 and the equations leave a way free."""
+        near = np.abs(self.multipliers - 1.0).min() < TOLERANCES.isolated
+        return not near or not _free(self.solution.evaluation.derivatives())[0].size
 
     @property
     def stable(self) -> bool:
-        """Whether all multipliers lie inside the unit circle, by more than rounding, and it does not graze: at a fold or a period
-        doubling it is not stable."""
+        """Whether it does not graze and all multipliers lie inside the unit circle by more than rounding: not at an LP or PD."""
         return bool((np.abs(self.multipliers) < 1.0 - TOLERANCES.on_circle).all()) and not self.grazes
 
     def start(self) -> dict[str, Any]:
@@ -342,10 +338,8 @@ class PeriodicOrbit(Result):
     @cached_property
     def defect(self) -> float:
         """The distance between its state and the one a period later, by direct simulation; inf if the motion has another number
-        of impacts, or cannot be followed, as where an event appears or is lost.
-
-        If the orbit grazes, rounding decides whether the motion has an impact there, and the defect is the square root of
-        rounding.
+        of impacts, or cannot be followed, as where an event appears or is lost. If the orbit grazes, rounding decides whether
+        the motion has an impact there, and the defect is the square root of rounding.
         """
         try:
             motion = self.motion()
@@ -431,21 +425,22 @@ class PeriodicOrbit(Result):
 def solve(
     equations: OrbitEquations, unknowns: np.ndarray, values: np.ndarray, iterations: int = NEWTON_ITERATIONS
 ) -> Solution | None:
-    """The orbit near a first guess at fixed parameters, or None where Newton's method does not converge.
-
-    Where the equations leave a direction free, as where a mass that nothing holds may stand anywhere, it keeps its place in it.
-    """
+    """The orbit near a first guess at fixed parameters, or None where Newton's method does not converge. Directions that the
+    equations leave free, as where a mass that nothing holds may stand anywhere, keep what they are."""
 
     def evaluate(place: np.ndarray, thorough: bool) -> OrbitEvaluation | None:
         return equations.evaluate(place, values, with_extremes=thorough)
 
     def linear(found: OrbitEvaluation, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        matrix = found.jacobian()
-        if np.isfinite(matrix).all():
-            left, lengths, right = np.linalg.svd(matrix)
-            free = lengths <= NEWTON.converged * lengths[0]
-            matrix += left[:, free] @ right[free]
-        return matrix, -found.residual
+        left, right = _free(matrix := found.jacobian())
+        return matrix + left @ right, -found.residual
 
     found = newton(evaluate, linear, unknowns, iterations)
     return None if found is None else Solution(found.place, values, found.evaluation, found.iterations)
+
+
+def _free(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The equations (m, k) that a matrix (m, n) does not decide up to rounding, and the directions (k, n) that it leaves free."""
+    left, lengths, right = np.linalg.svd(np.nan_to_num(matrix, posinf=0.0, neginf=0.0), full_matrices=False)
+    free = lengths <= NEWTON.converged * lengths[0]
+    return left[:, free], right[free]

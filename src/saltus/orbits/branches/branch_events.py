@@ -183,9 +183,8 @@ class BranchEvents(OrbitEvents):
             run.missed.append(Missed(OrbitMissed.IMPOSSIBLE_PAIR, SpecialKind.NS, where, where, modulus))
         if self.while_stable and cut is None and not ahead.orbit.stable:
             return super().ended(run, ahead, cut) or End(OrbitEnd.UNSTABLE, ahead.parameter)
-        before = run.points[-2:][0]
-        if not ahead.orbit.isolated and (before.orbit.grazes or not before.orbit.isolated):  # at a crossing one point is as that
-            return End(OrbitEnd.NOT_ISOLATED, before.parameter)
+        if not any(point.orbit.isolated for point in run.points[-2:]):  # one point alone may be where branches cross
+            return End(OrbitEnd.NOT_ISOLATED, run.points[-2:][0].parameter)
         return super().ended(run, ahead, cut)
 
     def across(self, run: Run, cut: Cut) -> OrbitPoint | End:
@@ -208,6 +207,8 @@ class BranchEvents(OrbitEvents):
         count, value = following.orbit.counted_impacts, following.parameter
         if (shorter := repetition(following)) is not None:
             return End(OrbitEnd.GRAZES_ANOTHER, value, detail=shorter)
+        if not following.orbit.isolated:
+            return End(OrbitEnd.NOT_ISOLATED, value)
         if count > SETTINGS.most_impacts:
             return End(OrbitEnd.MANY_IMPACTS, value, detail=str(SETTINGS.most_impacts))
         return End(OrbitEnd.ACCUMULATES, value, detail=str(count)) if _accumulate(run, following) else following
