@@ -251,6 +251,24 @@ def test_a_zero_is_located_to_rounding_where_rounding_moves_the_points_beside_it
         assert abs(found.point.place[0] - zero) < 1e-14
 
 
+def test_a_zero_beside_which_rounding_leaves_no_more_points_is_in_the_bracket_of_the_last_two():
+    """As beside a grazing of an orbit with an excursion of hardly any duration; a wider gap in a curve may hide another curve."""
+    zero = 0.3
+    for width, narrow in ((1e-9, True), (1e-4, False)):
+        asked = list[float]()
+
+        def broken(place: np.ndarray, width: float = width, asked: list[float] = asked) -> float:
+            near = [x for x in asked if abs(x - zero) < width]
+            asked.append(float(place[0]))
+            return float(place[1] if not near or not min(near) < zero < max(near) else 1e-3)
+
+        line = Explicit(broken, lambda place: np.array([0.0, 1.0]))
+        begin, end = (line.solve(np.array([x, 0.0]), np.array([1.0, 0.0])) for x in (0.0, 1.0))
+        found = located(Function("zero", lambda point: math.expm1(2.0 * (float(point.place[0]) - zero)), 1e-15), begin, end)
+        assert found is None or abs(found.point.place[0] - zero) < 2e-9
+        assert (found is not None) == narrow
+
+
 def test_a_corrector_that_goes_round_at_a_kink_is_given_up():
     """Newton's method jumps to and fro between both branches of 1 + abs(x), which has no zero, until it is told not to."""
     asked = []

@@ -17,8 +17,9 @@ from saltus.taylor.private_numba import OPTIONS
 
 _kernel = {"np": np, "ZERO": ZERO} | dict.fromkeys(("jit", "lean_jit"), numba.njit(**OPTIONS))
 exec(compiled_part(roots), _kernel)
-excluded, first_root, horner, value_and_slope, newton, to_bernstein, variations = (
-    _kernel[name] for name in ("excluded", "first_root", "horner", "value_and_slope", "newton", "to_bernstein", "variations")
+excluded, first_root, horner, value_and_slope, newton, roots_within, to_bernstein, variations = (
+    _kernel[name]
+    for name in ("excluded", "first_root", "horner", "value_and_slope", "newton", "roots_within", "to_bernstein", "variations")
 )
 EPS = 2.0**-52
 DEGREES = st.integers(2, 23)
@@ -285,3 +286,11 @@ def test_newton_is_exact_to_rounding_and_stays_in_its_bracket():
         slope = abs(np.polynomial.Polynomial(p).deriv()(root))
         assert abs(found - root) <= 4 * EPS * p.size * size(p) / slope
         assert abs(horner(p, p.size - 1, found)) <= 4 * EPS * p.size * size(p)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_root_beside_one_at_the_start_is_found_beside_it(sign):
+    """As of the speed of a gap whose contact has just been released: 0 with its slope, up to rounding of the slope."""
+    p, found = sign * np.array([0.0, -1e-12, 1.0, 0.5]), np.zeros(4)
+    assert roots_within(p, 3, found, 1e-18) == 1
+    assert found[0] == pytest.approx(1e-12, rel=1e-9)

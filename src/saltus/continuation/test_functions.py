@@ -34,6 +34,7 @@ class LocationSettings:
     near: float = 0.3  # How far a point may lie off the cubic through its neighbours, as a share of their distance.
     # Where a curve has a kink at the zero of a one-sided function, points beside it are off the cubic at every distance. The
     # bracket of a step shorter than this, in the norm of the curve, is then narrow enough; longer steps may hide another curve.
+    # So is a bracket of two points of the curve within which rounding leaves no further one, whatever the step.
     kink: float = 2e-9
 
 
@@ -76,7 +77,7 @@ def located(test: TestFunction, a: Any, b: Any, singular: bool = False) -> Zero 
     following = _next_share_from_one_side if test.one_sided else _next_share
     while (share := following(known, before, test.width, widths)) is not None:
         point = at_share(share)
-        if point is None and test.one_sided and a.curve.norm(b.place - a.place) < SETTINGS.kink:
+        if point is None and _is_narrow(known, before, whole=test.one_sided):
             break
         if point is None or not np.isfinite(value := test.value(point)):
             return None
@@ -91,6 +92,13 @@ def located(test: TestFunction, a: Any, b: Any, singular: bool = False) -> Zero 
     evidence = Evidence(best.point.residual, brackets, before, after, best.value)
     zero: Zero = best.point.zero_type(test.kind, best.point, evidence)
     return zero
+
+
+def _is_narrow(known: list[KnownPlace], before: float, whole: bool) -> bool:
+    """Whether the bracket of the zero, or the whole step, is so short that no point of the curve need be found in it."""
+    i = 0 if whole or before == 0.0 else _bracket(known, before)
+    first, last = known[i].point, known[-1 if whole else i + 1].point
+    return bool(first.curve.norm(last.place - first.place) < SETTINGS.kink)
 
 
 def _bracket(known: list[KnownPlace], before: float) -> int:

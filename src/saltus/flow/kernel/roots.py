@@ -272,7 +272,7 @@ def roots_within(p, n, roots, noise):
         if count == 1 or wide < NARROW or top + 2 > DEPTH:
             if count % 2 == 0:
                 continue
-            roots[found] = root_between(p, n, low, low + wide, b[0] < 0.0)
+            roots[found] = root_between(p, n, low, low + wide, leading_sign(b, n) < 0)  # b[0] may be 0
             found += 1
             continue
         half = 0.5 * wide
