@@ -205,7 +205,7 @@ def keeps_rest(system: System, given: Mapping[str, np.ndarray]) -> np.ndarray:
     arrays = (given.get(path, np.asarray(value)) for path, value in system.parameters.items())
     columns = np.broadcast_arrays(*map(np.atleast_1d, arrays))
     size = columns[0].size if columns else 1
-    if traced.records or sorted(traced.contact_coordinates) != list(range(traced.dof)):
+    if traced.records or traced.dependent or sorted(traced.contact_coordinates) != list(range(traced.dof)):
         return np.zeros(size, dtype=bool)
     state = {
         Expr("coordinate", (), i): position for i, position in zip(traced.contact_coordinates, traced.positions, strict=True)

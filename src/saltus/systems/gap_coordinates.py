@@ -11,6 +11,7 @@ it on the others, which stay on the surface s = p (`dependent_sums`).
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import fields, is_dataclass, replace
 from functools import cache
 from typing import Any, ClassVar
@@ -18,12 +19,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from saltus.errors import ParameterError
-from saltus.systems.contact_model import Contact, ContactModel, Friction, Surface
-from saltus.systems.gap_places import INVERSE, TURNS, GapPlaces, Part, columns_of, inverse, places_of, terms_of
+from saltus.systems.contact_model import Contact, ContactModel, Friction, Surface, solved_motion
+from saltus.systems.gap_places import CLOSED_BELOW, INVERSE, TURNS, GapPlaces, Part, columns_of, inverse, places_of, terms_of
 from saltus.systems.load import Load
 from saltus.systems.model import Jet, as_given, derivatives_along, each_of, less, weighted
-
-CLOSED_BELOW = 1e-13  # A contact is closed, up to rounding, if both its gap and its speed are smaller than this.
 
 
 class InGapCoordinates(ContactModel):
@@ -250,6 +249,41 @@ class InGapCoordinates(ContactModel):
         """
         found = self._of_sums(t, theta, velocity, load)
         return [(row, -(bend + 2.0 * rate + left)) for row, (left, rate, bend) in zip(self.sum_rows(), found, strict=True)]
+
+    def completed(self, t: Any, load: Any, state: np.ndarray, held: Sequence[int] = ()) -> np.ndarray:
+        """A state (2 n,) with the dependent sums that follow from its other coordinates, and their rates.
+
+        Coordinates at the places `held` are at their nearest contacts, sums among them without a rate: the others are moved there
+        by the shortest way, except for those that are held. Numbers may be complex, for derivatives.
+        """
+        first, found = len(self.coordinates) - self.dependent, state.copy()
+        (q, v), at = np.split(found, 2), dict[int, Any]()
+        q[first:], v[first:] = self._sums_and_rates(t, load, found)
+        for place in held:
+            beside = [each.position for each in self.contacts if each.coordinate == self.coordinates[place]]
+            at[place] = min(beside, key=lambda position, place=place: abs(position - q[place]))  # type: ignore[misc]
+            q[place] = at[place] if place < first else q[place]
+        q[first:], v[first:] = self._sums_and_rates(t, load, found)
+        if sums := [place for place in held if place >= first]:
+            free = [place for place in range(first) if place not in at]
+            rows = np.array(self.sum_rows())[np.ix_([place - first for place in sums], free)]
+            moved = rows.T @ np.linalg.solve(rows @ rows.T, np.array([[at[place] - q[place], -v[place]] for place in sums]))
+            q[free], v[free] = q[free] + moved[:, 0], v[free] + moved[:, 1]
+            q[first:], v[first:] = self._sums_and_rates(t, load, found)
+        return found
+
+    def forces_along(self, t: Any, q: Any, v: Any, load: Any, closed: Sequence[np.ndarray]) -> dict[int, Any]:
+        """The reactions along dependent sums, by their places, at instants (n, m), in each row of which contacts are closed."""
+        pairs = [*zip(self.contacts, closed, strict=True)]
+        held = ([shut for each, shut in pairs if each.coordinate == name] for name in self.coordinates)
+        free = [1.0 - np.any([np.zeros(len(t), dtype=bool), *own], axis=0)[:, None] for own in held]
+        return solved_motion(self, t, q, v, load, free).along
+
+    def _sums_and_rates(self, t: Any, load: Any, state: np.ndarray) -> list[list[Any]]:
+        """Dependent sums and their rates, as they follow from the other coordinates of a state."""
+        q, v = (tuple(half.tolist()) for half in np.split(state, 2))
+        found, first = self._of_sums(t, q, v, load), len(q) - self.dependent
+        return [[q[first + i] + left for i, (left, _, _) in enumerate(found)], [rate for _, rate, _ in found]]
 
     def sum_rows(self) -> list[list[Any]]:
         """B T as rows."""

@@ -1,20 +1,24 @@
-"""Which coordinates of a model the sums take the place of that its contacts, surfaces and frictions keep.
+"""Which coordinates of a model the sums take the place of that its contacts, surfaces and frictions keep, and states in these.
 
-A sum that follows from those before it takes no place, and is a further coordinate.
+A sum that follows from those before it takes no place, and is a further coordinate. States beside contacts keep it so.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
+
+import numpy as np
 
 from saltus.errors import ParameterError
 from saltus.systems.contact_model import Contact, Friction, Surface
 from saltus.systems.model import is_function, is_zero, reads_of
 
 Part = Contact | Surface | Friction
+CLOSED_BELOW = 1e-13  # A contact is closed, up to rounding, if both its gap and its speed are smaller than this.
 INVERSE, TURNS = "_inverse", " turns"  # behind the name of a model's function, its inverse, and the margin that ends this
 
 
@@ -156,3 +160,64 @@ def inverse(rows: list[list[Any]], order: Sequence[int], one: Any = 1.0) -> list
                 left[i] = [x if is_zero(y) else x - factor * y for x, y in zip(left[i], left[k], strict=True)]
                 right[i] = [x if is_zero(y) else x - factor * y for x, y in zip(right[i], right[k], strict=True)]
     return right
+
+
+# --- states (..., d) in coordinates of gaps, with sums that follow from the others ---------------------------------------
+
+
+def led(leads: Callable[..., Any], states: np.ndarray) -> np.ndarray:
+    """States (..., d) in other coordinates, at time 0."""
+    found = np.concatenate(leads(0.0, *np.split(states.reshape(-1, states.shape[-1]).T, 2)))
+    return np.asarray(found.T.reshape(*states.shape[:-1], len(found)))
+
+
+def with_sums(system: Any, states: np.ndarray) -> np.ndarray:
+    """States at phase 0 with the dependent sums that follow from their other coordinates."""
+    model, load = system.model, system.load
+    return led(lambda t, q, v: model.gap_states(t, *model.own_states(t, q, v, load), load), states)
+
+
+def normal_of(system: Any, place: int) -> np.ndarray:
+    """The coefficients of the coordinates that depend on no others in the coordinate at a place, which may depend on them."""
+    first = len(system.model.coordinates) - system.dependent
+    return np.eye(first)[place] if place < first else np.array(system.model.sum_rows()[place - first], dtype=float)
+
+
+def pushed(system: Any, states: np.ndarray, place: int, by: np.ndarray) -> np.ndarray:
+    """States of which the coordinate at a place changes by these amounts, by the shortest way; their sums are not changed."""
+    moved, normal = states.copy(), normal_of(system, place)
+    moved[..., : len(normal)] += by[..., None] * normal / (normal @ normal)
+    return moved
+
+
+def reflected(system: Any, states: np.ndarray) -> np.ndarray:
+    """States, changed in place: each is reflected at the contact that it is farthest beyond until it is beyond none, which comes
+    to an end where there is room (Motzkin and Schoenberg 1954)."""
+    names, contacts = system.model.coordinates, system.model.contacts
+    found, places = with_sums(system, states).reshape(-1, 2 * len(names)), [names.index(each.coordinate) for each in contacts]
+    widths = np.array([np.linalg.norm(normal_of(system, place)) for place in places])
+    for _ in range(1000):  # a few are enough where there is room
+        gaps = np.stack([each.gap(found[:, place]) for each, place in zip(contacts, places, strict=True)]) / widths[:, None]
+        if not (beyond := gaps < -CLOSED_BELOW).any():
+            break
+        for i, place in enumerate(places):
+            rows = beyond[i] & (gaps.argmin(axis=0) == i)
+            found[rows] = pushed(system, found[rows], place, -2.0 * contacts[i].sign * gaps[i, rows] * widths[i])
+        found = with_sums(system, found)
+    states[...] = found.reshape(states.shape)
+    return states
+
+
+def held_exactly(system: Any, states: np.ndarray, held: np.ndarray) -> np.ndarray:
+    """States with the dependent sums that follow from the other coordinates, which are moved where a contact holds a sum."""
+    if not system.dependent:
+        return states
+    found, last = (
+        with_sums(system, states),
+        slice(len(system.model.coordinates) - system.dependent, len(system.model.coordinates)),
+    )
+    for at in map(tuple, np.argwhere(held[..., last].any(axis=-1))):
+        with contextlib.suppress(np.linalg.LinAlgError):  # those that are held leave the sum no room
+            chosen = np.flatnonzero(held[at][: last.stop]).tolist()
+            found[at] = system.model.completed(0.0, system.load, states[at], chosen)
+    return found

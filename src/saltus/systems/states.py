@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Any
 
@@ -11,7 +11,8 @@ import numpy as np
 
 from saltus.checks import LIMITS, as_numbers, check_number
 from saltus.errors import ParameterError, near, shown
-from saltus.systems.gap_coordinates import CLOSED_BELOW, InGapCoordinates
+from saltus.systems.gap_coordinates import InGapCoordinates
+from saltus.systems.gap_places import CLOSED_BELOW, held_exactly, led, normal_of, pushed, reflected
 from saltus.systems.model import Model
 from saltus.systems.system import System
 
@@ -43,15 +44,17 @@ def read_start(
         A name is no coordinate (the message has similar names), a coordinate is not given, or a value is no finite number.
     """
     model: Any = system.model
-    if isinstance(model, InGapCoordinates) and coordinates.keys() & {*model.own_class.coordinates} - {*model.coordinates}:
+    names, given = {*model.coordinates}, {*coordinates}
+    own_names = {*model.own_class.coordinates} if isinstance(model, InGapCoordinates) else names
+    if given & own_names - names or (own_names < names and given == own_names):
         own = system.with_(model=model.as_given())
         return np.concatenate(own.to_gaps(time, *np.split(read_start(own, velocity, coordinates, arguments), 2)))
-    names, most = model.coordinates, LIMITS.value
-    positions = coordinates.values() if tuple(coordinates) == names else _positions(system, coordinates, arguments)
+    most, in_order = LIMITS.value, model.coordinates
+    positions = coordinates.values() if tuple(coordinates) == in_order else _positions(system, coordinates, arguments)
     values = [*positions, *_speeds(velocity, model)]
     for i, value in enumerate(values):
         if not (type(value) is float and abs(value) <= most):
-            check_number(names[i] if i < len(names) else "velocity", _plain(value))
+            check_number(in_order[i] if i < len(in_order) else "velocity", _plain(value))
     return system._with_rates(time, np.array(values, dtype=float))
 
 
@@ -135,18 +138,12 @@ def state_of(system: System, arguments: Mapping[str, Any]) -> np.ndarray:
 
 def in_gaps(system: System, states: np.ndarray) -> np.ndarray:
     """States (..., d) at phase 0 as those of `system.in_gap_coordinates`."""
-    return states if system.in_gap_coordinates is system else _led(system.to_gaps, states)
+    return states if system.in_gap_coordinates is system else led(system.to_gaps, states)
 
 
 def from_gaps(system: System, states: np.ndarray) -> np.ndarray:
     """The inverse of `in_gaps`."""
-    return states if system.in_gap_coordinates is system else _led(system.from_gaps, states)
-
-
-def _led(leads: Callable[..., Any], states: np.ndarray) -> np.ndarray:
-    """States (..., d) in other coordinates, at time 0."""
-    flat = states.reshape(-1, states.shape[-1]).T
-    return np.asarray(np.concatenate(leads(0.0, *np.split(flat, 2))).T.reshape(states.shape))
+    return states if system.in_gap_coordinates is system else led(system.from_gaps, states)
 
 
 HALF_WIDTH = 1.5  # the half width of the default window: about the size of the motions in the paper
@@ -299,6 +296,8 @@ def on_this_side(system: System, states: np.ndarray) -> np.ndarray:
         states[...] = from_gaps(system, on_this_side(inner, in_gaps(system, states)))
         return states
     names = system.model.coordinates
+    if system.dependent:
+        return reflected(system, states)
     if len(system.model.sides) == 1:
         wall, inward = float(system.one_contact.contact), system.one_contact.inward(system.model.sides[0])
         states[..., 0] = wall + inward * np.abs(states[..., 0] - wall)
@@ -327,7 +326,8 @@ def states_beside(system: System, states: np.ndarray, shifts: np.ndarray) -> np.
         closed = held[..., place] & (np.asarray(contact.gap(states[..., place])) == 0.0) | (least < CLOSED_BELOW)
         moved[..., place] = np.where(closed, float(contact.position), moved[..., place])
         moved[..., len(names) + place] = np.where(closed, 0.0, moved[..., len(names) + place])
-    return moved
+        held[..., [place, len(names) + place]] |= closed[..., None]
+    return held_exactly(system, moved, held)
 
 
 def before_impacts(system: System, states: np.ndarray) -> np.ndarray:
@@ -342,7 +342,7 @@ def before_impacts(system: System, states: np.ndarray) -> np.ndarray:
         place, position = names.index(contact.coordinate), float(contact.position)
         into = (np.asarray(contact.gap(moved[..., place])) == 0.0) & (contact.sign * moved[..., len(names) + place] < 0.0)
         back = np.nextafter(position, position + contact.sign) + contact.sign * beside
-        moved[..., place] = np.where(into, back, moved[..., place])
+        moved = pushed(inner, moved, place, np.where(into, back - moved[..., place], 0.0))
     return from_gaps(system, moved)
 
 
@@ -374,7 +374,8 @@ def held_values(system: System, state: np.ndarray, within: float, closed: int = 
 
 
 def _held(system: System, states: np.ndarray, bounds: np.ndarray) -> np.ndarray:
-    """States (..., n, d) in which some coordinates are held at contacts, alternating as `within_window` says."""
+    """States (..., n, d) in which some coordinates are held at contacts, alternating as `within_window` says; not those where
+    this leads beyond another contact, as it may with dependent sums."""
     names, turn = system.model.coordinates, np.arange(states.shape[-2]) // 2
     reached: dict[int, list[float]] = {}
     for contact in system.model.contacts:
@@ -382,14 +383,20 @@ def _held(system: System, states: np.ndarray, bounds: np.ndarray) -> np.ndarray:
         (low, high), (slowest, fastest) = bounds[place], bounds[len(names) + place]
         if low <= position <= high and slowest <= 0.0 <= fastest:
             reached.setdefault(place, []).append(position)
-    choices = [chosen for n in range(len(names)) for chosen in itertools.combinations(sorted(reached), n)]
+    count = len(normal_of(system, 0))
+    choices = [chosen for n in range(count) for chosen in itertools.combinations(sorted(reached), n)]
+    found, held = states.copy(), np.zeros(states.shape, dtype=bool)
     for number, chosen in enumerate(choices):
         rows = turn % len(choices) == number
         for place in chosen:
             at, positions = states[..., rows, place], np.array(reached[place])
-            states[..., rows, place] = positions[np.abs(at[..., None] - positions).argmin(axis=-1)]
-            states[..., rows, len(names) + place] = 0.0
-    return states
+            found[..., rows, place] = positions[np.abs(at[..., None] - positions).argmin(axis=-1)]
+            found[..., rows, len(names) + place], held[..., rows, place] = 0.0, True
+    if count == len(names):
+        return found
+    found = held_exactly(system, found, held)
+    gaps = [np.asarray(each.gap(found[..., names.index(each.coordinate)])) for each in system.model.contacts]
+    return np.where((np.min(gaps, axis=0) < -CLOSED_BELOW)[..., None], states, found)
 
 
 def check_reached(model: Model, coordinate: str, values: Any, name: str) -> None:

@@ -64,10 +64,8 @@ class System:
         _check_parts(self)
         for channel in self.load.channels:
             if channel not in self.model.channels:
-                known = [*self.model.channels, "frequency"]
-                raise ParameterError(
-                    f"{type(self.model).__name__} does not read load.{channel}; {near(channel, known)}", f"load.{channel}"
-                )
+                hint = near(channel, [*self.model.channels, "frequency"])
+                raise ParameterError(f"{type(self.model).__name__} does not read load.{channel}; {hint}", f"load.{channel}")
         self.model.check_load(self.load)
         if _passes(self.model, self.impact):  # refuses sums that cannot be coordinates
             inner = System(model=in_gap_coordinates(self.model), load=self.load, impact=self.impact)
@@ -153,6 +151,11 @@ class System:
         the place of y. All other numbers are the same, under the same paths.
         """
         return self._in_gaps or self
+
+    @property
+    def dependent(self) -> int:
+        """How many coordinates of `in_gap_coordinates`, the last ones, are sums that follow from the others."""
+        return int(getattr(self.in_gap_coordinates.model, "dependent", 0))
 
     def from_gaps(self, time: Any, position: Any, velocity: Numbers) -> tuple[Any, Any]:
         """Coordinates and velocities of this system, for those of `in_gap_coordinates`; the same objects where that is itself.
@@ -378,11 +381,10 @@ def check_system(
     coordinates: int | None = None,
     several_contacts: bool = False,
     sums: bool = True,
-    dependent: bool = False,
 ) -> None:
     """Refuse anything but a System whose model has the contacts and the number of coordinates that `asking` is for.
 
-    Without `sums` each contact and surface must be of a single coordinate, without `dependent` no sum may follow from others.
+    Without `sums` each contact and surface must be of a single coordinate.
 
     Raises
     ------
@@ -391,7 +393,7 @@ def check_system(
     """
     if not isinstance(system, System):
         raise ParameterError(f"{asking} takes a System(model=..., load=..., impact=...), got {shown(system)}", "system")
-    if several_contacts and sums and dependent and coordinates is None:
+    if several_contacts and sums and coordinates is None:
         return
     inner, names = system.in_gap_coordinates, system.model.coordinates
     if inner is not system and not sums:
@@ -400,9 +402,6 @@ def check_system(
             f"{', '.join(inner.model.coordinates)}",
             "system",
         )
-    if not dependent and (left := getattr(inner.model, "dependent", 0)):
-        what = f"sums that follow from those of others, here {', '.join(inner.model.coordinates[-left:])}"
-        raise ParameterError(f"{asking} does not take {what}; simulate, simulate_many and sensitivities do", "system")
     if coordinates is not None and (len(names) != coordinates or system.model.first_order):
         wanted = "one coordinate" if coordinates == 1 else f"{coordinates} coordinates"
         what = ", ".join(names) + " of first order" * (len(names) == coordinates)

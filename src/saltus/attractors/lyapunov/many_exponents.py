@@ -191,7 +191,7 @@ def lyapunov_many(
     ['at_half', 'end_theta', 'end_velocity', 'ending', 'error', 'exponent', 'later_half', 'period', 'positive', 'resolution']
     """
     check_run("lyapunov_many", system, periods, transient, tol)
-    if len(system.model.coordinates) > 1:
+    if len(system.in_gap_coordinates.model.coordinates) > 1:
         raise ParameterError(
             "lyapunov_many works on models with one coordinate; lyapunov_spectrum takes any, one motion at a time", "system"
         )

@@ -173,6 +173,7 @@ class EnsembleResult:
             here = ends.states[:, :own].T, ends.states[:, rows : rows + own].T
             into = state_slopes(model.gap_values, self.inputs.values["time"], (start[:given], start[given:]), load)
             derivatives = state_slopes(model.own_values, self.time, here, load) @ derivatives @ into
+            shifts = (shifts[:, None] @ into)[:, 0]
             second = model.own_values(self.time, load, *([*x] if own > 1 else x[0] for x in (*here, rates.T)))[2]
             rates, own = np.column_stack(np.broadcast_arrays(self.time, *(second if given > 1 else [second])))[:, 1:], given
         slope = np.concatenate([self.last[:, own:], rates], axis=1)

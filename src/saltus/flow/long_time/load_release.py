@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from saltus.checks import answered
+from saltus.errors import ParameterError
 from saltus.systems import ContactModel, Load, System, check_system, mass_and_force
 
 RELEASE_SAMPLES = 64  # per forcing period and order of the highest harmonic: the contact acceleration has no narrower peak
@@ -99,6 +100,10 @@ def load_releases(system: System) -> tuple[Release, ...]:
     [1, -1]
     """
     check_system(system, "load_releases", several_contacts=True)
+    if system.dependent:
+        raise ParameterError(
+            "load_releases is for systems whose contacts can all be closed, and here gaps depend on others", "system"
+        )
     system = system.in_gap_coordinates
     if system.load.period is None:
         return ()

@@ -417,7 +417,7 @@ def _rest_lasts(system: System) -> bool:
     system = system.in_gap_coordinates
     contacts, names = system.model.contacts, system.model.coordinates
     known = not contacts or sorted(contact.coordinate for contact in contacts) == sorted(names)
-    known &= not (system.model.frictions or system.model.surfaces)
+    known &= not (system.model.frictions or system.model.surfaces or system.dependent)
     return known and not load_releases(system)
 
 

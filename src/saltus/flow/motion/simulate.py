@@ -121,7 +121,7 @@ class MotionRequest:
         sensitivities: tuple[str, ...] | None = None,
         dense_tangent: bool = True,
     ) -> None:
-        check_system(system, "simulate", several_contacts=True, dependent=True)
+        check_system(system, "simulate", several_contacts=True)
         structure_key(system)  # what a system remembers is forgotten where values that its classes read have changed
         start = read_start(system, velocity, coordinates, NAMES[sensitivities is not None], time)
         self.given, self.system = system, system.in_gap_coordinates

@@ -47,8 +47,8 @@ def last_release(point: OrbitPoint) -> SpecialPoint | None:
     from scipy.optimize import brentq
 
     equations, orbit, value = point.curve.equations, point.orbit, point.parameter
-    known = load_releases(orbit.system)
-    if orbit.system.model.holds_coordinates or not known:
+    known = () if orbit.system.model.holds_coordinates else load_releases(orbit.system)
+    if not known:
         return None
 
     def pull(at: float) -> float:

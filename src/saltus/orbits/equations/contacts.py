@@ -77,10 +77,10 @@ class ContactsEquations(OrbitEquations):
 
     @classmethod
     def read(cls, base: OrbitEquations, motion: MotionToRead) -> tuple[OrbitEquations, np.ndarray] | None:
-        """None with frictions, with accumulations of impacts, or with walls that move the mass matrix, for which there are no
-        equations from event to event."""
+        """None with frictions, dependent sums or accumulations of impacts, or with walls that move the mass matrix, for which
+        there are no equations from event to event."""
         known: Any = base.system.contact_model if isinstance(base, cls) else None
-        if known is None or known.frictions or known.surfaces or _has_moving_mass(known):
+        if known is None or known.frictions or known.surfaces or base.system.dependent or _has_moving_mass(known):
             return None
         if motion.twice.limit is not None or len(motion.twice.events.of(EventKind.HELD)):
             return None

@@ -357,8 +357,9 @@ class OrbitEquations(ABC):
 
     @cached_property
     def following(self) -> np.ndarray:
-        """The places of unknowns that follow from the others, the velocities of coordinates of first order; they are 0."""
-        return np.arange(2 * self.own - len(self.system.model.first_order), 2 * self.own)
+        """The places of unknowns that follow from the others, velocities of coordinates of first order and dependent sums: 0."""
+        moving, own = 2 * self.own - len(self.system.model.first_order), self.own
+        return np.array([*range(own - self.system.dependent, own), *range(moving, 2 * own)], dtype=int)
 
     @property
     def margins(self) -> tuple[str, ...]:

@@ -201,7 +201,7 @@ def _moves(system: System, side: np.ndarray) -> np.ndarray:
     """Whether a motion with these numbers `side` is not held altogether, (n,)."""
     modes = modes_in(system)
     held = np.sum([np.zeros(np.shape(side)), *modes.closed(side), *(direction == 0 for direction in modes.slides(side))], axis=0)
-    return np.asarray(held < len(system.model.coordinates))
+    return np.asarray(held < len(system.model.coordinates) - system.dependent)
 
 
 def read_signature(motion: Motion, periods: int, frequency: float) -> tuple[Signature, np.ndarray, np.ndarray]:

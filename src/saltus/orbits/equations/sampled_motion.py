@@ -267,8 +267,7 @@ class SampledMotion:
 
     def _state(self) -> tuple[Any, Any, Any]:
         """Coordinates, velocities and accelerations as a model takes them."""
-        parts = (self.position, self.velocity, self.acceleration)
-        q, v, a = (x[0] if len(x) == 1 else tuple(x) for x in parts)
+        q, v, a = (x[0] if len(x) == 1 else tuple(x) for x in (self.position, self.velocity, self.acceleration))
         return q, v, a
 
     def lowest(self) -> float:
@@ -362,8 +361,10 @@ class SampledMotion:
 
     def _forces(self, forces: Callable[..., list[Any]]) -> list[np.ndarray]:
         """The forces that the function `forces` gives along the samples, each (steps, samples)."""
-        q, v, _ = self._state()
-        values = forces(self.motion.system.model, self.time, q, v, list(self.acceleration), self.motion.system.load)
+        system, given = self.motion.system, (self.time, *self._state()[:2])
+        model: Any = system.model
+        more = ((), model.forces_along(*given, system.load, modes_in(system).closed(self.side))) if system.dependent else ()
+        values = forces(model, *given, list(self.acceleration), system.load, *more)
         return [np.broadcast_to(np.asarray(value, dtype=float), self.time.shape) for value in values]
 
     def _narrowed(self, number: int, step: int, sample: int, forces: Callable[..., list[Any]]) -> float:

@@ -9,10 +9,10 @@ coordinate.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any
+from functools import cached_property, partial
+from typing import Any, cast
 
 import numpy as np
 
@@ -49,7 +49,7 @@ from saltus.orbits.equations.sampled_motion import SampledMotion, modes_in
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
 from saltus.progress import silent
-from saltus.systems import System, arguments_of, held_values, image_of
+from saltus.systems import System, arguments_of, held_values, image_of, substitute
 from saltus.taylor import FREQUENCY
 
 CLOSED = 1e-9  # A contact is closed at the section if its gap and the gap's rate are smaller than this there.
@@ -179,16 +179,40 @@ class WholeMotionEquations(OrbitEquations):
     def curve_barrier(self, kind: str, point: Any) -> TestFunction:
         return same_events(point)
 
-    def held(self, state: np.ndarray, system: System) -> dict[int, float]:
+    def held(self, unknowns: np.ndarray, system: System) -> dict[int, float]:
         """The state variables that are fixed at the section, up to rounding, with their values."""
-        return held_values(system, state, CLOSED)
+        return held_values(system, self._completed(unknowns, system), CLOSED)
 
     def start_state(self, unknowns: np.ndarray, system: System) -> np.ndarray:
         """The state at the section, in which contacts that are closed, and frictions that stick, up to rounding do so exactly."""
-        state = unknowns.copy()
-        for place, value in self.held(unknowns, system).items():
+        held = self.held(unknowns, system)
+        state = self._completed(unknowns, system, held)
+        for place, value in held.items():
             state[place] = value
         return state
+
+    def _completed(self, unknowns: np.ndarray, system: System, held: Iterable[int] = ()) -> np.ndarray:
+        """The unknowns, or a copy of them with the dependent sums that follow from them at the section (`InGapCoordinates`)."""
+        state, twin = unknowns.copy(), cast("Any", system)
+        if not self.system.dependent:
+            return state
+        time = float(self.signature.section or 0.0) / twin.load.frequency
+        return np.asarray(twin.model.completed(time, twin.load, state, [place for place in held if place < self.own]))
+
+    def _start_slopes(self, unknowns: np.ndarray, system: System) -> tuple[np.ndarray, np.ndarray]:
+        """The derivatives of the start state to the unknowns and to the parameters, at complex numbers, where sums follow from
+        other coordinates; those to what is held are 0."""
+        held, step = self.held(unknowns, system), 1e-100
+        found = []
+        for j, path in enumerate([*range(len(unknowns)), *self.paths]):
+            beside, twin = unknowns.astype(complex), system
+            if path in self.paths:
+                twin = substitute(system, partial(_raised, path, 1j * step))
+            else:
+                beside[j] += 1j * step
+            found.append(np.imag(self._completed(beside, twin, held)) / step)
+        columns = np.stack(found, axis=1)
+        return columns[:, : len(unknowns)], columns[:, len(unknowns) :]
 
     def evaluate(
         self, unknowns: np.ndarray, values: np.ndarray, with_extremes: bool = False, *, later: np.ndarray | None = None
@@ -251,6 +275,9 @@ class WholeMotionEquations(OrbitEquations):
             before = image_of(system.model, rates) if self.signature.symmetric else rates
             parameters[:, self.paths.index(FREQUENCY)] -= (rates - found.state @ before) * phase / frequency**2
         after, state = np.append(np.atleast_1d(motion.position), np.atleast_1d(motion.velocity)), found.state
+        if self.system.dependent:
+            by_unknowns, by_parameters = self._start_slopes(unknowns, system)
+            state, parameters = state @ by_unknowns, parameters + state @ by_parameters
         if self.signature.symmetric:
             after, state, parameters = (image_of(system.model, numbers.T).T for numbers in (after, state, parameters))
         here, there = state[None].copy(), -np.eye(len(after))[None]
@@ -317,3 +344,8 @@ class WholeMotionEquations(OrbitEquations):
                 least[name] for name in self.margins
             ]
         return extremes
+
+
+def _raised(path: str, by: complex, at: str, value: Any) -> Any:
+    """A number of a system, raised if it is the one at a path."""
+    return value + by if at == path else value

@@ -150,6 +150,8 @@ def _refuse_rest(system: System, motion: Motion, state: dict[str, Any]) -> None:
         return
     start = ", ".join(f"{name}={value!r}" for name, value in state.items())
     farther = "start farther from it, for instance with a larger coordinate or velocity"
+    if system.dependent:  # not all of their contacts can be closed
+        raise MotionError(STAYS)
     released = bool(load_releases(system))
     if not motion.phase_known and not released:
         raise MotionError(
@@ -374,4 +376,5 @@ def _mapped_singly(
         evaluation = equations.evaluate(state, np.array([value]))
         if evaluation is not None:
             ends[i], slopes[i] = state + evaluation.residual, np.where(held[i], 0.0, evaluation.here[0])
+            ends[i, equations.following] = state[equations.following]
     return ends, slopes
