@@ -79,11 +79,13 @@ def test_every_claim_of_the_study_holds():
     assert {id for id, verdict in found.items() if verdict is ClaimVerdict.AS_PRINTED} == found.keys() - ours
 
 
+@pytest.mark.thorough
 def test_the_data_says_where_it_comes_from_and_no_picture_is_clipped():
     check_provenance("smoothing", data())
     assert clipped(FIGURES["smoothing"].draw(data())) == []
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("group", "variable", "change", "id"),
     [
