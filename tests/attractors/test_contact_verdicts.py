@@ -107,8 +107,9 @@ def test_chaos_between_two_walls_has_the_exponent_of_two_neighbouring_motions():
     assert abs(mean / (2 * math.pi) - exponent) < 3 * math.hypot(spread / (2 * math.pi), error / 2)
 
 
-@pytest.mark.parametrize("cells", [2, *(pytest.param(each, marks=pytest.mark.thorough) for each in (3, 4))])
-@pytest.mark.parametrize("coupling", [pytest.param(0.0, marks=pytest.mark.thorough), 0.3])
+@pytest.mark.thorough  # seconds of compiling each
+@pytest.mark.parametrize("cells", [2, 3, 4])
+@pytest.mark.parametrize("coupling", [0.0, 0.3])
 def test_a_chain_of_equal_cells_is_classified_and_ends_on_the_orbit_of_one_of_them(cells, coupling):
     """Cells that move alike do not stretch the springs between them, and their events happen at one instant: without a spring
     each cell is a `TwoLayer`, and with one the motion in which all are alike is the same and attracts here."""
