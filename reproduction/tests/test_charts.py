@@ -277,7 +277,7 @@ def test_erratum_34_a_slow_load_leaves_rest_alone_in_and_beside_the_quasi_static
         assert (ends.rest | (np.maximum(ends.highest, -ends.lowest) < 1e-3)).all()
 
 
-@pytest.mark.parametrize(("horizontal", "vertical"), [(0.05, -0.5), (0.1, -1.4)])
+@pytest.mark.parametrize(("horizontal", "vertical"), [(0.05, -0.5), pytest.param(0.1, -1.4, marks=pytest.mark.thorough)])
 def test_erratum_34_by_another_integrator_motions_come_to_rest_under_a_slow_load(horizontal, vertical):
     """DOP853 from impact to impact: from the plane's other parts to impacts that leave the contact by less than 0.001 rad, as the
     least pull towards it, V cos(beta0) + H sin(beta0), is 0.037 or more."""

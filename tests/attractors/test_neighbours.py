@@ -40,7 +40,7 @@ def test_neighbours_part_as_the_derivatives_say_through_impacts_that_die_away():
     np.testing.assert_allclose(rates[0], growth / time[0], rtol=0, atol=2e-4)
 
 
-@pytest.mark.parametrize(("damping", "together"), [(0.1, False), (1.0, True)])
+@pytest.mark.parametrize(("damping", "together"), [(0.1, False), pytest.param(1.0, True, marks=pytest.mark.thorough)])
 def test_the_exponent_of_an_orbit_is_that_of_its_multiplier_also_where_neighbours_become_one(damping, together):
     """With much damping these pairs come nearer in four periods than two motions can tell."""
     orbit = saltus.find_orbit(layers(2.0, damping=damping, e=0.0), theta_1=0.1, theta_2=0.0)

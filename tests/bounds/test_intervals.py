@@ -58,7 +58,7 @@ def graphs():
 ranges = st.tuples(st.floats(-4, 4), st.sampled_from([0.0, 1e-9, 0.01, 0.5, 3.0]))
 
 
-@settings(deadline=None, max_examples=400)
+@settings(deadline=None, max_examples=150)
 @given(graphs(), st.tuples(ranges, ranges, ranges), st.integers(0, 2**32 - 1))
 def test_bounds_hold_at_every_point(root, boxes, seed):
     spans = {leaf: Interval(lo, lo + width) for leaf, (lo, width) in zip(LEAVES, boxes, strict=True)}

@@ -157,7 +157,7 @@ LOADS = st.fixed_dictionaries({"frequency": st.floats(1e-2, 20)}, optional=dict.
 STARTS = st.fixed_dictionaries({"duration": st.just(1.0)}, optional={"theta": st.floats(-6, 6)})
 
 
-@settings(deadline=None, max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(deadline=None, max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(METAINTERFACES, LOADS, STARTS)
 def test_no_metainterface_is_beyond_description(saltus, tmp_path, model, load, simulate):
     path = tmp_path / "study.toml"

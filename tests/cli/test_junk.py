@@ -50,13 +50,13 @@ def test_junk_bytes(content):
     assert attempt(content) is None
 
 
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=80)
 @given(STUDIES)
 def test_junk_tables(tables):
     attempt(tomli_w.dumps(tables).encode())
 
 
-@settings(deadline=None, max_examples=150)
+@settings(deadline=None, max_examples=60)
 @given(STUDIES, st.data())
 def test_damaged_studies(tables, data):
     good = tomli_w.dumps({"model": {"type": "Metainterface", "beta0": 1.4}, **tables}).encode()

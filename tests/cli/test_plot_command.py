@@ -21,7 +21,7 @@ ASKS = {
     "basins": "[basins]\ntheta = [-1, 0, 1]\nvelocity = [0, 1]\n",
     "stability_chart": "[stability_chart]\nhorizontal = [0.1, 0.3]\nvertical = [-1.9, -0.5]\n",
 }
-LONGEST = ("bifurcation_diagram", "stability_chart")
+LONGEST = ("bifurcation_diagram", "stability_chart", "attractors", "phase_portrait")
 
 
 @pytest.mark.parametrize("kind", [pytest.param(kind, marks=pytest.mark.thorough if kind in LONGEST else ()) for kind in ASKS])

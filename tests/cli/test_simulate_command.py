@@ -83,7 +83,7 @@ def test_a_limit_that_is_reached_ends_the_motion(saltus, study, tmp_path):
 
 @pytest.mark.parametrize("name", sorted(path.name for path in EXAMPLES.glob("*.toml")))
 def test_every_example_runs(saltus, tmp_path, name):
-    result = saltus("simulate", EXAMPLES / name, "-o", tmp_path)
+    result = saltus("simulate", EXAMPLES / name, "-o", tmp_path, "--no-plot")
     assert result.exit_code == 0, result.stderr
 
 

@@ -140,7 +140,7 @@ def start_of(x):
 BEGIN = np.array([0.0, 2.0, 0.3, 0.1, 0.0, 0.4])
 
 
-@pytest.mark.parametrize("duration", [2.5, 5.0])
+@pytest.mark.parametrize("duration", [pytest.param(2.5, marks=pytest.mark.thorough), 5.0])
 def test_derivatives_are_those_of_differences(duration):
     found = sensitivities(BLOCK, **START, duration=5.0, parameters=PATHS)
     wanted = differences(BLOCK, BEGIN, PATHS, lambda system, x: simulate(system, **start_of(x), duration=duration).final_state)

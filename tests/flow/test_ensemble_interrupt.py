@@ -38,7 +38,7 @@ else:
 @pytest.mark.parametrize(
     ("n", "periods", "options"),
     [
-        (200_000, 10_000, "dict()"),
+        pytest.param(200_000, 10_000, "dict()", marks=pytest.mark.thorough),
         (16, 10**9, "dict()"),  # one chunk that never ends
         pytest.param(16, 10**9, "dict(threads=1, progress=lambda fraction, what: None)", marks=pytest.mark.thorough),
     ],

@@ -176,9 +176,12 @@ def test_states_beyond_a_contact_are_outside(state):
     assert str(stop_names(result).values) == "outside"
 
 
-def test_derivatives_of_ensembles_are_those_of_single_motions():
+OF_LAYERS = ("load.frequency", "impact.e.1", "impact.transfer", "model.beta0", "load.vertical", "impact.e.0")
+
+
+@pytest.mark.parametrize("paths", [OF_LAYERS[:3], pytest.param(OF_LAYERS, marks=pytest.mark.thorough)], ids=["some", "all"])
+def test_derivatives_of_ensembles_are_those_of_single_motions(paths):
     """The lanes take other steps than the scalar kernel does; where the motion is calm both agree to 1e-7 of the largest."""
-    paths = ("model.beta0", "load.frequency", "load.vertical", "impact.e.0", "impact.e.1", "impact.transfer")
     system, (numbers, x, v) = layers(e=(0.1, 0.1), transfer=0.2), random_parameters(24, seed=7)
     options = {"duration": 4.0, "tol": 1e-13}
     result = saltus.simulate_many(

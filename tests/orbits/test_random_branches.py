@@ -123,6 +123,7 @@ def test_branches_have_orbits_up_to_where_they_meet_their_images():
     is_solved_up_to_its_image(branch, 1)
 
 
+@pytest.mark.thorough
 def test_three_pairs_of_special_points_that_lie_within_one_step_each():
     """On the main branch at Hhat = 0.2 two symmetry breakings each at 14 and at 10 impacts, and the two folds of the peak."""
     orbit = find_orbit(forced(0.2), theta=0.3, parameters=(FREQUENCY,))

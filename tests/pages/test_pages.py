@@ -1,4 +1,4 @@
-"""Every block of code on every page runs, and prints what the page says."""
+"""Every block of code on every page runs, and prints what the page says; the pages that take longest in `make thorough`."""
 
 from pathlib import Path
 
@@ -10,6 +10,7 @@ ROOT = Path(__file__).parents[2]
 GENERATED = {"_build", "api", "gallery"}
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 PAGES = [page for page in PAGES if not GENERATED & set(page.relative_to(ROOT).parts)]
+LONGEST = {"charts.md", "spectra.md", "fit.md", "experiments.md", "contact_orbits.md"}  # three to six seconds each
 
 
 def command(*arguments):
@@ -22,7 +23,11 @@ def command(*arguments):
     return result
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+@pytest.mark.parametrize(
+    "page",
+    [pytest.param(page, marks=pytest.mark.thorough if page.name in LONGEST else ()) for page in PAGES],
+    ids=lambda page: str(page.relative_to(ROOT)),
+)
 def test_a_page_prints_what_it_says(page, tmp_path, monkeypatch):
     pyplot = pytest.importorskip("matplotlib.pyplot")
     pyplot.switch_backend("agg")

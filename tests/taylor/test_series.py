@@ -107,7 +107,7 @@ def many():
     return Generated(System(model=Many(), load=LOAD))
 
 
-@pytest.mark.parametrize(("x", "v", "t"), [(0.35, 0.55, 0.0), (-0.45, -0.3, 2.1)])
+@pytest.mark.parametrize(("x", "v", "t"), [(0.35, 0.55, 0.0), pytest.param(-0.45, -0.3, 2.1, marks=pytest.mark.thorough)])
 def test_taylor_coefficients_of_each_operation_and_elementary_function(many, x, v, t):
     computed, rows = many.coefficients(t, x, v, 12), enumerate(OPERATIONS)
     expected = {name: solution(lambda t, q, w, f=f: f(q, w, force(t), 1.3, 0.6), x, v, t, 12) for name, f in OPERATIONS.items()}
