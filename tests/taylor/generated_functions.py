@@ -29,7 +29,7 @@ class Generated:
         self.structure = load_structure(self.trace)
         parameters = np.array([value for _, value in numbers(system)] or [0.0])
         self.env, _ = self.structure.prepare(parameters, record_table(system, self.trace.records))
-        several = ("series", "matrices", "matrix_slopes", "tangent")
+        several = ("series", "matrices", "matrix_slopes", "tangent", "load_series")
         names = several if self.trace.signs else ("series", "contact_series", "reset", "contact_damping", "tangent")
         self._functions = dict(zip(names, self.structure.functions, strict=True))
 

@@ -12,11 +12,11 @@ from .end import End as End
 from .end import EndReason as EndReason
 from .end import Missed as Missed
 from .end import MissedReason as MissedReason
-from .predictor import STEPS as STEPS
-from .predictor import between as between
 from .pseudo_arclength import NEWTON as NEWTON
+from .pseudo_arclength import STEPS as STEPS
 from .pseudo_arclength import Corrected as Corrected
 from .pseudo_arclength import EquationCurve as EquationCurve
+from .pseudo_arclength import between as between
 from .pseudo_arclength import newton as newton
 from .test_functions import Cut as Cut
 from .test_functions import Events as Events

@@ -12,7 +12,7 @@ import numpy as np
 from saltus.continuation.course import Course, solved_between, turning_point
 from saltus.continuation.curve import Zero
 from saltus.continuation.end import CurveEnd, CurveMissed, End, Missed
-from saltus.continuation.predictor import STEPS, StepSettings
+from saltus.continuation.pseudo_arclength import STEPS, StepSettings
 from saltus.continuation.test_functions import Cut, Events, located
 from saltus.continuation.trail import Trail, TrailPoint
 from saltus.progress import Progress, silent

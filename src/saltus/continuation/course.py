@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.checks import check_count
 from saltus.continuation.end import CurveEnd, End, Missed
-from saltus.continuation.predictor import STEPS, between, cubic
+from saltus.continuation.pseudo_arclength import STEPS, between, cubic
 from saltus.continuation.test_functions import TestFunction, located
 
 

@@ -12,8 +12,7 @@ import numpy as np
 
 from saltus.continuation.curve import Evidence, Zero
 from saltus.continuation.end import CurveEnd, End
-from saltus.continuation.predictor import between
-from saltus.continuation.pseudo_arclength import NEWTON
+from saltus.continuation.pseudo_arclength import NEWTON, between
 
 if TYPE_CHECKING:
     from saltus.continuation.continuation_loop import Continuation

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.continuation.predictor import arc, between
+from saltus.continuation.pseudo_arclength import arc, between
 from saltus.continuation.test_functions import Events
 
 

@@ -26,6 +26,7 @@ import numpy as np
 from saltus.checks import check_number
 from saltus.errors import ParameterError, near, shown
 from saltus.systems.contact_model import Contact, ContactModel, Friction, Surface
+from saltus.systems.eigenmodes import eigenmodes_of
 from saltus.systems.impact_laws import Coefficients, NamedParts, RowNumbers, Vectors
 from saltus.systems.model import Count, is_zero
 from saltus.systems.record_files import ConstantNumbers, check_independent, check_matrices, matrices_in, read_array
@@ -193,6 +194,8 @@ class Structure(ContactModel):
     records: Any = dataclasses.field(default=None, repr=False)
     form: Any = dataclasses.field(default=None, repr=False)
 
+    eigenmodes = eigenmodes_of  # the table that the kernel reads
+
     def __post_init__(self) -> None:
         given = matrices_in(self.file, IN_FILES) if self.file else {name: getattr(self, name) for name in IN_FILES}
         mass, stiffness, damping = (_matrix(given.get(name), name) for name in IN_FILES)
@@ -214,9 +217,7 @@ class Structure(ContactModel):
         made |= {"forces": Vectors(forces), "points": Vectors(points), "coefficients": Coefficients(modes.coefficients())}
         made |= {"records": ConstantNumbers(modes.records(), "records")}
         made |= {"form": (tuple(local), modes.damping is not None, modes.coupled, pattern)}
-        for name, value in made.items():
-            object.__setattr__(self, name, value)
-        object.__setattr__(self, "_modes", modes)
+        vars(self).update(made, _modes=modes)
 
     @property
     def coordinates(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -338,11 +339,10 @@ class Structure(ContactModel):
         for name, given in (("displacement", displacement), ("velocity", velocity)):
             vector = _vector(np.full(len(self.names), given) if np.ndim(given) == 0 else given, self.names, name)
             found.append([float(x) for x in vars(self)["_modes"].inverse @ vector])
-        local = [self.names.index(name) if name in self.names else None for name in self.form[0]]
+        local = [(i, self.names.index(name)) for i, name in enumerate(self.form[0]) if name in self.names]
         for values, given in zip(found, (displacement, velocity), strict=True):
-            for i, row in enumerate(local):  # exactly as given, so that what is at a contact is there
-                if row is not None:
-                    values[i] = float(given if np.ndim(given) == 0 else given[row])
+            for i, row in local:  # exactly as given, so that what is at a contact is there
+                values[i] = float(given if np.ndim(given) == 0 else given[row])
         return {**dict(zip(self.coordinates, found[0], strict=True)), "velocity": found[1] if len(found[1]) > 1 else found[1][0]}
 
 

@@ -386,8 +386,10 @@ def only_open(contacts):
 
 @lean_jit
 def is_smooth(motion):
-    """Whether a motion without friction is on a smooth arc, with no guards known to be 0 but those of `only_open`."""
-    return motion.mode == Mode.ARC and motion.frictions.shape[0] == 0 and only_open(motion.contacts)
+    """Whether a motion without friction, and not in eigenmodes, is on a smooth arc, with no guards known to be 0 but those of
+    `only_open`."""
+    together = motion.frictions.shape[0] == 0 and motion.eigenmodes.size == 0
+    return motion.mode == Mode.ARC and together and only_open(motion.contacts)
 
 
 @lean_jit

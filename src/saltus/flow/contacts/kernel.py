@@ -70,7 +70,7 @@ from saltus.flow.contacts.tangent import (
 from saltus.flow.kernel.layout import SHORTEST, ZERO, EventCode, Mode, Status
 from saltus.flow.kernel.memory import ContactsParts
 from saltus.flow.kernel.roots import NEVER, SIMPLE, contact_root, margin_root, value_and_slope
-from saltus.flow.kernel.steps import columns_at_event, expand, motion_end, move, record_step, step_arrays
+from saltus.flow.kernel.steps import columns_at_event, expand, in_modes, mode_arrays, motion_end, move, record_step, step_arrays
 from saltus.taylor import jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
@@ -286,7 +286,7 @@ def seek_event(motion, t, target):
     zero.
     """
     order, count, margins = motion.order, motion.contacts.shape[0], motion.margin_count
-    size = expand(motion, t, 1.0, order)
+    size = expand(motion, t, 1.0, order) if motion.eigenmodes.size == 0 else in_modes(motion, t, order)
     natural = contact_step_size(motion, t, target, size)
     natural = friction_step_size(motion, count, natural)
     h = min(natural, target - t)
@@ -396,4 +396,5 @@ def parts_of(numbers, state, env, functions, rows, buffers):
     count, steps = functions.signs.size, step_arrays(numbers)
     contacts, frictions = rows[:count], rows[count:]
     solver = solver_arrays(numbers.local, count, numbers.columns, frictions, numbers.first_order)
-    return ContactsParts(state, env, env[0], env[2], functions, contacts, frictions, steps, solver, buffers[0], buffers[1])
+    modes = mode_arrays(numbers, functions.eigenmodes)
+    return ContactsParts(state, env, env[0], env[2], functions, contacts, frictions, steps, modes, solver, *buffers)

@@ -53,7 +53,8 @@ def end_scalar(lane, motion):
     contacts = lane.contact_rows[lane.index][: lane.sizes.contacts]
     lane.side = 1.0 + write_closed(lane, contacts)
     lane.leave_by = motion.leave_by
-    if lane.sizes.frictions > 0 or motion.mode != Mode.ARC or not only_open(contacts):
+    followed = lane.sizes.frictions > 0 or functions_of(lane).eigenmodes.size > 0
+    if followed or motion.mode != Mode.ARC or not only_open(contacts):
         lane.scalar |= 1 << lane.index
 
 

@@ -92,7 +92,7 @@ class CompiledStructure:
     frictions: int = 0
 
     def prepare(
-        self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray], data: Any = ()
+        self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray], data: Any = (), eigenmodes: Any = ()
     ) -> tuple[tuple[Any, ...], Any]:
         """The arguments `env` and `model` of the kernel for given numbers (see `one_contact/kernel.py`). Those of modes, `data`,
         follow the constants."""
@@ -101,12 +101,10 @@ class CompiledStructure:
         fill_constants(self.tables[0], parameters, constants)
         if self.several:
             env = (np.append(parameters, behind_parameters(self.frictions, self.sizes.local)), constants, *records)
-            series, matrices, slopes, tangent = self.functions
-            return env, ContactsFunctions(series, matrices, np.array(self.signs, dtype=float), slopes, tangent)
+            return env, ContactsFunctions(*self.functions, np.array(self.signs, dtype=float), np.array(eigenmodes, dtype=float))
         env = (parameters, constants, *records)
         fill_geometry(self.tables[1], env, geometry)
-        series, contact_series, reset, damping, tangent = self.functions
-        return env, OneContactFunctions(series, contact_series, reset, damping, geometry, tangent)
+        return env, OneContactFunctions(*self.functions[:4], geometry, self.functions[4])
 
 
 _FILLERS = """
@@ -173,13 +171,12 @@ def kernel_text(*modules: ModuleType) -> str:
 def load_structure(trace: Trace) -> CompiledStructure:
     """The functions of a trace's structure."""
     made = load_functions("structure", structure_functions(trace), trace)
-    one_contact, several = ("contact_series", "reset", "contact_damping"), ("matrices", "matrix_slopes")
-    names = ("series", *(several if trace.several else one_contact), "tangent")
+    one = ("series", "contact_series", "reset", "contact_damping", "tangent")
+    names = ContactsFunctions._fields[: len(one)] if trace.several else one
     stops, steep = len(trace.reactions) + len(trace.margins), int(is_steep(trace.acceleration))
-    own = (trace.first_order, trace.dof, trace.columns, trace.local)
-    sizes = Sizes(len(trace.acceleration), stops, 1, trace.side_count, steep, *own)
+    first = len(trace.acceleration), stops, 1, trace.side_count, steep, trace.first_order
     return CompiledStructure(
-        sizes,
+        Sizes(*first, trace.dof, trace.columns, trace.local),
         max(1, len(constants(trace))),
         tuple(made[name] for name in names),
         (made["constants"], made["matrices" if trace.several else "geometry"]),
@@ -200,10 +197,13 @@ def structure_functions(trace: Trace) -> list[WrittenFunction]:
     instant = ("side", "env", "piece")
     functions = [_series(trace, known), _table("constants", Places(("parameters", "constants"), ENV), list(known), {})]
     if trace.several:
-        return [*functions, _matrices(trace, known), _matrix_slopes(trace, known), _tangent(trace, known)]
+        inputs = () if trace.modes is None or trace.columns else trace.modes.inputs
+        loads = {MOST_COEFFICIENTS * (each.place - 1 - trace.local): each.of for each in inputs if not each.local}
+        events = _matrices(trace, known), _matrix_slopes(trace, known), _tangent(trace, known)
+        return [*functions, *events, _in_time("load_series", loads, known)]
     return [
         *functions,
-        _contact_series(trace, known),
+        _in_time("contact_series", {} if trace.contact_acceleration is None else {0: trace.contact_acceleration}, known),
         _at_impact("reset", ("t", "origin", "v0", *instant), impact, known),
         _at_impact("contact_damping", ("t", "origin", *instant), damping, known),
         _tangent(trace, known),
@@ -283,13 +283,11 @@ def _data(known: dict[Expr, int]) -> dict[str, tuple[str, int]]:
     return {"datum": ("constants", max(1, len(known)))}
 
 
-def _contact_series(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
-    """The Taylor coefficients in the time of the gap's second derivative at rest at contact."""
+def _in_time(name: str, roots: dict[int, Expr], known: dict[Expr, int]) -> WrittenFunction:
+    """The Taylor coefficients of expressions of the time, by their places."""
     places = Places(("t", "origin", "side", "env", "piece", "b", "w", "order"), LEAVES)
-    if trace.contact_acceleration is None:
-        return _function("contact_series", places, [])
-    layout = Rows([], [], [("b", 0)], MOST_COEFFICIENTS, any_order=True)
-    return _function("contact_series", places, SeriesOf(layout, tape([trace.contact_acceleration], known, series=True)))
+    layout = Rows([], [], [("b", i) for i in roots], MOST_COEFFICIENTS, any_order=True)
+    return _function(name, places, SeriesOf(layout, tape(list(roots.values()), known, series=True)) if roots else [])
 
 
 def _matrices(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
@@ -380,7 +378,9 @@ def _made(system: System, limits: tuple[str, ...], sensitivities: tuple[str, ...
     parameters = np.array([value for _, value in numbers(system)])
     model: Any = system.in_gap_coordinates.model
     data = model.records.array if traced.modes is not None else ()
-    made = structure.prepare(parameters, record_table(system, traced.records), data)
+    other = traced.modes is None or traced.columns or traced.margins or model.frictions
+    eigenmodes = () if other else model.eigenmodes(MOST_COEFFICIENTS)
+    made = structure.prepare(parameters, record_table(system, traced.records), data, eigenmodes)
     return Program(traced, structure, *made, tuple(traced.margins))
 
 

@@ -153,13 +153,22 @@ class OneContactFunctions(NamedTuple):
 
 
 class ContactsFunctions(NamedTuple):
-    """The functions of a structure with several contacts, and the contacts' signs."""
+    """The functions of a structure with several contacts, the contacts' signs, and its eigenmodes."""
 
     series: Any
     matrices: Any
-    signs: Any
     matrix_slopes: Any  # the derivatives, along each column of the tangent, of the numbers that `matrices` fills
     tangent: Any
+    load_series: Any  # of the load's channels, for eigenmodes
+    signs: Any
+    eigenmodes: Any  # the table of `systems/eigenmodes.py`; empty for motions that are not followed in them
+
+
+class ModeArrays(NamedTuple):
+    """The series of a structure in its eigenmodes."""
+
+    mode_series: Any
+    input_series: Any
 
 
 class OneContactParts(NamedTuple):
@@ -255,6 +264,7 @@ class ContactsParts(NamedTuple):
     contacts: Any  # a row for each contact, in the columns of `ContactColumn`
     frictions: Any  # a row for each friction, in the columns of `FrictionColumn`
     step_arrays: StepArrays
+    mode_arrays: ModeArrays
     solver: SolverArrays
     step_buffers: StepBuffers
     event_buffers: EventBuffers
@@ -310,7 +320,7 @@ ENV = types.Tuple((_f1, _f1, _f1, _f3))  # parameters, constants, record breakpo
 CONSTANTS = types.void(_f1, _f1)
 GEOMETRY = types.void(ENV, _f1)
 SERIES = types.void(_f, _f, _f, ENV, _i, _f2, _f2, _f2, _f1, _f2, _f2, _i)
-CONTACT_SERIES = types.void(_f, _f, _f, ENV, _i, _f1, _f2, _i)
+CONTACT_SERIES = LOAD_SERIES = types.void(_f, _f, _f, ENV, _i, _f1, _f2, _i)
 RESET = types.UniTuple(_f, 2)(_f, _f, _f, _f, ENV, _i)
 CONTACT_DAMPING = _f(_f, _f, _f, ENV, _i)
 TANGENT = types.void(_i, _i, _f, _f, _f, ENV, _i, _f1)
@@ -319,7 +329,8 @@ MATRICES = MATRIX_SLOPES = types.void(ENV, _i, _f1, _f1)
 _functions = [written_type(s) for s in (SERIES, CONTACT_SERIES, RESET, CONTACT_DAMPING, TANGENT)]
 MODEL = types.NamedTuple((*_functions[:4], _f1, _functions[4]), OneContactFunctions)
 _matrices = written_type(MATRICES)
-CONTACT_MODEL = types.NamedTuple((_functions[0], _matrices, _f1, _matrices, _functions[4]), ContactsFunctions)
+_contacts = (_functions[0], _matrices, _matrices, _functions[4], _functions[1], _f1, _f1)
+CONTACT_MODEL = types.NamedTuple(_contacts, ContactsFunctions)
 NUMBERS = types.Array(from_dtype(MOTION), 1, "C")
 STEP_BUFFERS = types.NamedTuple((_i2, _f2, _f3), StepBuffers)
 EVENT_BUFFERS = types.NamedTuple((_i2, _f2), EventBuffers)

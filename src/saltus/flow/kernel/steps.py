@@ -9,9 +9,10 @@ import math
 
 import numpy as np
 
+from saltus.flow.contacts.layout import ContactColumn, FrictionColumn
 from saltus.flow.kernel.layout import DEFECT, GAP, ROUGHER, SAFETY, SMALLEST, EventCode
-from saltus.flow.kernel.memory import StateArrays, StepArrays
-from saltus.flow.kernel.roots import both_sums, horner
+from saltus.flow.kernel.memory import ModeArrays, StateArrays, StepArrays
+from saltus.flow.kernel.roots import NOISE, both_sums, horner
 from saltus.taylor import jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
@@ -223,3 +224,145 @@ def motion_end(motion):
     if motion.until_smooth > 0:
         return motion.horizon
     return (motion.last_period - motion.period) * motion.period_length + motion.end
+
+
+# Structures in eigenmodes (`systems/eigenmodes.py`).
+
+
+@jit
+def mode_arrays(numbers, table):
+    """The series of eigenmodes, with two rows for what drives one of them, and those of their inputs."""
+    rows, inputs = 0, 0
+    if table.size > 0:
+        rows, inputs = 2 * numbers.own + 2, int(table[0] * table[1])
+    return ModeArrays(np.zeros((rows, numbers.order + 2)), np.zeros(inputs))
+
+
+@lean_jit
+def drive_mode(motion, factors, row, order):
+    """Put the series of what drives a row of the eigenmodes into a row; `factors` is the place of the first input's."""
+    table, driven, inputs = motion.eigenmodes, motion.mode_series[row], motion.input_series
+    channels, spacing = int(table[0]), int(table[1])
+    for k in range(order + 2):
+        driven[k] = 0.0
+    for c in range(channels):
+        factor = table[factors + c]
+        for k in range(order + 2):
+            driven[k] += factor * inputs[c * spacing + k]
+    driven[0] += table[factors + channels]
+    for i in range(motion.local):
+        driven[0] += table[factors + channels + 1 + i] * motion.coordinates[i]
+
+
+@lean_jit
+def one_mode(motion, place, j, order, allowed):
+    """The series of a real eigenmode from its value, which begins it: the polynomial of `systems/eigenmodes.py` if it is on that
+    to within what is allowed. Its eigenvalue is at a place of the table."""
+    y, f, value = motion.mode_series[j], motion.mode_series[2 * motion.own], motion.eigenmodes[place]
+    start = y[0]
+    if value < 0.0:
+        following, inverse = 0.0, 1.0 / value
+        for k in range(order + 1, -1, -1):
+            following = inverse * ((k + 1) * following - f[k])
+            y[k] = following
+        if abs(start - y[0]) <= allowed:
+            return
+    y[0] = start
+    for k in range(order + 1):
+        y[k + 1] = (value * y[k] + f[k]) * motion.eigenmodes[2 + k]
+
+
+@lean_jit
+def two_modes(motion, place, j, order, allowed):
+    """The same of a complex eigenmode, whose imaginary part is in the next row."""
+    series, table, driven = motion.mode_series, motion.eigenmodes, 2 * motion.own
+    y, z, f, g, real, imaginary = series[j], series[j + 1], series[driven], series[driven + 1], table[place], table[place + 1]
+    start, other = y[0], z[0]
+    if real < 0.0:
+        square, one, two = real * real + imaginary * imaginary, 0.0, 0.0
+        a, b = real / square, imaginary / square
+        for k in range(order + 1, -1, -1):
+            p, r = (k + 1) * one - f[k], (k + 1) * two - g[k]
+            one, two = a * p + b * r, a * r - b * p
+            y[k], z[k] = one, two
+        if math.hypot(start - y[0], other - z[0]) <= allowed:
+            return
+    y[0], z[0] = start, other
+    for k in range(order + 1):
+        inverse = table[2 + k]
+        y[k + 1] = (real * y[k] - imaginary * z[k] + f[k]) * inverse
+        z[k + 1] = (real * z[k] + imaginary * y[k] + g[k]) * inverse
+
+
+@lean_jit
+def in_mode(motion, rows, states):
+    """A row of the eigenvectors' inverse times the state, and the sum of the absolute values."""
+    total, absolute, table = 0.0, 0.0, motion.eigenmodes
+    for i in range(states // 2):
+        one, two = table[rows + i] * motion.coordinates[i], table[rows + states // 2 + i] * motion.velocities[i]
+        total += one + two
+        absolute += abs(one) + abs(two)
+    return total, absolute
+
+
+@lean_jit
+def add_modes(motion, factors, states, order, series):
+    """Fill a series with a sum of eigenmodes."""
+    table = motion.eigenmodes
+    for k in range(order + 2):
+        series[k] = 0.0
+    for j in range(states):
+        factor, mode = table[factors + j], motion.mode_series[j]
+        if factor != 0.0:
+            for k in range(order + 2):
+                series[k] += factor * mode[k]
+
+
+@lean_jit
+def in_modes(motion, t, order):
+    """Fill the series of the coordinates, their rates and the reactions of closed contacts; returns the size of the state."""
+    table, own, count, size = motion.eigenmodes, motion.own, motion.contacts.shape[0], 0.0
+    states, given, bits = 2 * own, int(table[0]) + 1 + motion.local, 0
+    for i in range(count):
+        bits |= motion.contacts[i, ContactColumn.CLOSED] << i
+    for k in range(motion.frictions.shape[0]):  # the rows of surfaces
+        bits |= (1 if motion.frictions[k, FrictionColumn.SLIDES] > 0 else 0) << (count + k)
+    length = states * (3 + states + own + given + count) + count * given
+    values = 2 + int(table[1]) + bits * length
+    reach = values + 2 * states
+    inverse = reach + states
+    vectors = inverse + states * states
+    inputs = vectors + own * states
+    reactions = inputs + states * given
+    by_inputs = reactions + count * states
+    for i in range(own):
+        size = max(size, abs(motion.coordinates[i]), abs(motion.velocities[i]))
+    motion.load_series(t, motion.origin, 1.0, motion.env, motion.piece, motion.input_series, motion.recurrences, order + 1)
+    allowed, j = motion.tolerance * max(size, SMALLEST), 0
+    while j < states:
+        width = 1 if table[values + 2 * j + 1] == 0.0 else 2
+        enough = allowed / (table[reach + j] + SMALLEST)
+        for i in range(width):
+            drive_mode(motion, inputs + (j + i) * given, states + i, order)
+            motion.mode_series[j + i, 0], terms = in_mode(motion, inverse + (j + i) * states, states)
+            enough = max(enough, NOISE * terms)
+        if width == 1:
+            one_mode(motion, values + 2 * j, j, order, enough)
+        else:
+            two_modes(motion, values + 2 * j, j, order, enough)
+        j += width
+    for i in range(own):
+        q, v, a = motion.coordinate_series[i], motion.velocity_series[i], motion.acceleration_series[i]
+        add_modes(motion, vectors + i * states, states, order, q)
+        for k in range(order + 1):
+            v[k] = (k + 1) * q[k + 1]
+        for k in range(order):
+            a[k] = (k + 1) * v[k + 1]
+        q[0], v[0] = motion.coordinates[i], motion.velocities[i]
+    for i in range(count):
+        if bits >> i & 1:
+            add_modes(motion, reactions + i * states, states, order, motion.margin_series[i])
+            drive_mode(motion, by_inputs + i * given, states, order)
+            for k in range(order + 2):
+                motion.margin_series[i, k] += motion.mode_series[states, k]
+    return size

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -134,6 +135,8 @@ def run_ensemble(
     system, inputs = system.in_gap_coordinates, inputs.in_gaps(system)
     driver = compile_driver_aside(system.model.holds_coordinates)
     run = program(system, options.limits, options.paths)
+    if run.structure.several and any(path.startswith("model.") for path in inputs.parameters):
+        run = replace(run, model=run.model._replace(eigenmodes=np.zeros(0)))  # the table of eigenmodes has the model's numbers
     jobs = _jobs(system, run, inputs, options.periods, duration, side)
     if Until.REST in options.until:
         jobs.rows["capture_speed"] = capture_speeds(system, inputs.parameters, options.limits, known=captured)

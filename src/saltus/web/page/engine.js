@@ -255,7 +255,7 @@ function lengthsOf({ layout, dof, contacts, frictions, description, width }) {
     numbers: [1], state: [2 * dof],
     parameters: [description.numbers.length + layout.modes.length], constants: [layout.constant_count],
     breaks: [most], table: [rows.length, most + 1, terms],
-    geometry: [3], signs: [layout.signs.length],
+    geometry: [3], signs: [layout.signs.length], eigenmodes: [0],
     rows: [contacts.length + frictions.length, (layout.FrictionColumn.STRUCK ?? 0) + 1],
     step_labels: [BUFFER, 2], step_spans: [BUFFER, 2], step_series: [BUFFER, dof, layout.most_order + 2],
     event_labels: [BUFFER, 4], event_values: [BUFFER, width],

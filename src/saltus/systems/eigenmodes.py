@@ -1,0 +1,168 @@
+"""The motion of a structure between its events in its eigenmodes, of which those that have died out limit no step.
+
+While a structure keeps its contacts and the sides of its surfaces, its state obeys x' = A x + B u, with the inputs u: the
+channels of the load, 1, and the positions at which contacts hold it. In A's eigenvectors each coordinate y has an equation of
+its own,
+
+    y' = lambda y + f(t).
+
+Its Taylor coefficients follow forwards from its value, y_(k+1) = (lambda y_k + f_k) / (k + 1), and limit the step to a few
+1 / abs(lambda), however small y is, as what rounding leaves of it grows as fast in them. But one polynomial of the same degree n
+obeys the equation up to the power t^n, found backwards: y_k = ((k + 1) y_(k+1) - f_k) / lambda from y_n = -f_n / lambda. If the
+real part of lambda is negative, a solution differs from it by at most what it does at the start and the polynomial's last term.
+So a mode whose value is that of its polynomial to within the error that a step may make is followed on it.
+
+`in_modes` in `flow/kernel/steps.py` computes both, from the table that is made here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+
+def eigenmodes_of(structure: Any, spacing: int) -> np.ndarray:
+    """The table of a structure's eigenmodes that the kernel reads; empty where its own Taylor series are faster or more accurate.
+
+    It begins with the number of channels and the place of a channel's series behind that of the one before. Then follow, for each
+    set of closed contacts and of surfaces on whose side +1 it is, lambda, how far a mode reaches in units of the state, the rows
+    of the inverse of the eigenvectors, the eigenvectors' coordinates, and the factors of the inputs; then the reactions of the
+    contacts by eigenmodes and by inputs. The real and the imaginary part of a mode have rows of their own.
+    """
+    return _table(structure, spacing)
+
+
+@lru_cache(maxsize=8)
+def _table(structure: Any, spacing: int) -> np.ndarray:
+    contacts, surfaces = structure.contacts, structure.surfaces
+    # The eigenmodes of all sets are kept. A step takes as long as 4 of the other kind for 12 coordinates, 30 for 100.
+    if len(contacts) + len(surfaces) > 3 or longer_steps(structure) < 2.0 + 0.05 * len(structure.names):
+        return np.zeros(0)
+    blocks = [np.array([len(structure.channels), spacing, *(1.0 / np.arange(1, spacing + 1))])]
+    for bits in range(1 << len(contacts) + len(surfaces)):
+        closed = [c for i, c in enumerate(contacts) if bits >> i & 1]
+        pressed = [s for i, s in enumerate(surfaces) if (2 * (bits >> len(contacts) + i & 1) - 1) * s.sign > 0]
+        block = _block(first_order_form(structure, closed, pressed))
+        if block is None:
+            return np.zeros(0)
+        blocks.append(block)
+    return np.concatenate(blocks)
+
+
+def longer_steps(structure: Any) -> float:
+    """How many times fewer steps the eigenmodes make of a period of the slowest mode with an impact in it: each mode is then
+    followed until it is 1e-10 of what it was. The modes are those with all contacts closed, without the terms that couple them.
+    """
+    a, size = first_order_form(structure, structure.contacts, ())[0], len(structure.names)
+    modes = np.arange(structure.local_count, size)
+    square, half = -a[size + modes, modes], -0.5 * a[size + modes, size + modes]
+    if not modes.size or not np.all(square > 0.0) or not np.any(half > 0.0):
+        return 1.0
+    root = np.sqrt((half**2 - square).astype(complex))
+    values, period = np.append(root - half, -root - half), 2.0 * math.pi / math.sqrt(square.min())
+    with np.errstate(divide="ignore"):
+        lives = np.minimum(period, 23.0 / np.maximum(-values.real, 0.0))
+    order = np.argsort(-lives)
+    fastest, ends = np.maximum.accumulate(np.abs(values[order])), lives[order]
+    return float(period * fastest[-1] / np.sum(fastest * (ends - np.append(ends[1:], 0.0))))
+
+
+def first_order_form(structure: Any, closed: Sequence[Any], pressed: Sequence[Any]) -> tuple[np.ndarray, ...]:
+    """A, B, P and Q of x' = A x + B u and of the reactions P x + Q u, (contacts,), while some contacts are closed. The
+    state x has the coordinates, then their rates; u has the channels of the load, 1, and the local displacements, of which
+    those that are held act.
+
+    Parameters
+    ----------
+    closed, pressed
+        The contacts that hold their coordinates, and the surfaces on whose side +1 the structure is.
+    """
+    modes, local = vars(structure)["_modes"], structure.form[0]
+    m, n = len(local), len(structure.names)
+    mass, push = np.eye(n), np.zeros((n, 1))
+    stiffness, damping = np.array(modes.stiffness), np.zeros((n, n)) if modes.damping is None else np.array(modes.damping)
+    mass[:m, :m] = modes.mass
+    for surface in pressed:
+        i = local.index(surface.coordinate)
+        stiffness[i, i] += surface.stiffness
+        damping[i, i] += surface.damping
+        push[i] += surface.stiffness * surface.position
+    held = [i for i, name in enumerate(local) if name in {contact.coordinate for contact in closed}]
+    free = [i for i in range(n) if i not in held]
+    forces = np.hstack([-stiffness, -damping, modes.forces, push, np.zeros((n, m))])
+    forces[:, 2 * n + modes.forces.shape[1] + 1 + np.array(held, dtype=int)] = forces[:, held]
+    forces[:, [*held, *(n + i for i in held)]] = 0.0
+    rates = np.zeros((2 * n, forces.shape[1]))
+    rates[free, [n + i for i in free]] = 1.0
+    rates[[n + i for i in free]] = np.linalg.solve(mass[np.ix_(free, free)], forces[free])
+    reactions = np.zeros((len(structure.contacts), forces.shape[1]))
+    for row, contact in zip(reactions, structure.contacts, strict=True):
+        if contact in closed:
+            i = local.index(contact.coordinate)
+            row[:] = contact.sign * (mass[i] @ rates[n:] - forces[i])
+    return rates[:, : 2 * n], rates[:, 2 * n :], reactions[:, : 2 * n], reactions[:, 2 * n :]
+
+
+def _block(form: Any) -> np.ndarray | None:
+    a, b, reactions, by_inputs = form
+    free = np.flatnonzero(np.abs(a[: len(a) // 2]).sum(axis=1))
+    moving = np.append(free, len(a) // 2 + free)
+    made = decoupled(a[np.ix_(moving, moving)])
+    if made is None:
+        return None
+    values, vectors, inverse = made
+    size, count = len(a), len(moving)
+    table = {name: np.zeros(shape) for name, shape in (("value", (size, 2)), ("reach", size), ("to", (size, size)))}
+    back, row = np.zeros((size, size)), 0
+    for value, vector, left in zip(values, vectors.T, inverse, strict=True):
+        if value.imag < 0.0:
+            continue
+        parts = (
+            ((left.real, vector.real),)
+            if value.imag == 0.0
+            else ((left.real, 2.0 * vector.real), (left.imag, -2.0 * vector.imag))
+        )
+        for ahead, behind in parts:
+            table["value"][row] = value.real, value.imag
+            table["reach"][row] = 2.0 * np.abs(vector).max()
+            table["to"][row, moving], back[moving, row] = ahead, behind
+            row += 1
+    assert row == count
+    inputs, held = table["to"] @ b, reactions @ back
+    return np.concatenate([x.ravel() for x in (*table.values(), back[: size // 2], inputs, held, by_inputs)])
+
+
+def decoupled(a: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """Eigenvalues, eigenvectors and their inverse; None where two eigenvectors are nearly parallel.
+
+    Those of slow modes have errors of the rounding of the fastest one. Residuals in extended precision, where the machine has
+    it, give their corrections.
+    """
+    values, vectors = np.linalg.eig(a)
+    apart = values[None, :] - values[:, None]
+    np.fill_diagonal(apart, 1.0)
+    if not np.all(np.abs(apart) > 1e-6 * np.maximum(np.abs(values), np.abs(values[:, None]))):
+        return None
+    rows, columns = np.nonzero(a)
+    given = a[rows, columns].astype(np.longdouble)[:, None]
+    exact, shapes = values.astype(np.clongdouble), vectors.astype(np.clongdouble)
+    for _ in range(2):
+        moved = np.zeros_like(shapes)
+        np.add.at(moved, rows, given * shapes[columns])
+        error = np.linalg.solve(shapes.astype(complex), (moved - shapes * exact).astype(complex))
+        turned = error / apart
+        np.fill_diagonal(turned, 0.0)
+        exact = exact + np.diag(error)
+        shapes = shapes + shapes.astype(complex) @ turned.astype(complex)
+    real = values.imag == 0.0
+    exact[real] = exact[real].real
+    shapes[:, real] = shapes[:, real].real
+    vectors = shapes.astype(complex)
+    inverse = np.linalg.inv(vectors)
+    if (np.linalg.norm(vectors, axis=0) * np.linalg.norm(inverse, axis=1)).max(initial=0.0) > 1e6:
+        return None
+    return exact.astype(complex), vectors, inverse
