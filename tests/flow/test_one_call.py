@@ -127,8 +127,9 @@ def test_a_motion_that_is_asked_for_again_is_the_same(name):
         assert one == other
         assert len(first.events) == len(again.events)
         assert all(a == b for a, b in zip(first.events, again.events, strict=True))
-    names = calls(lambda: motion(STARTS[1], system))
-    assert ("MotionRequest.__init__" in names) == (name == "ends at a limit")
+    for start in STARTS[:4]:
+        longer = "MotionRequest.__init__" in calls(lambda start=start: motion(start, system))
+        assert longer == (motion(start, system).limit is not None)
 
 
 def test_what_is_wrong_is_refused_however_often_a_system_was_followed():

@@ -94,7 +94,7 @@ def time_of(numbers: Any) -> float:
     return time
 
 
-Again = Callable[[Mapping[str, Any], Any], Motion | None]  # of coordinates and velocity, as `simulate` takes them
+Again = Callable[[Any, Mapping[str, Any], Any], Motion | None]  # of system, coordinates and velocity, as `simulate` takes them
 
 
 def remember(request: MotionRequest, run: Program) -> None:
@@ -116,10 +116,9 @@ def remember(request: MotionRequest, run: Program) -> None:
     local, first, _, _, *rest = AT_START.unpack_from(blank)
     size, steps, geometry = len(buffers.events.event_labels), buffers.steps, model.geometry.tolist()
     most = 2.0 * math.pi if request.plan.angles else np.inf  # beyond it `simulate` warns
-    same = {"system": system, "tol": request.tol, "start": request.time}
-    same |= dict.fromkeys(("limit", "dense", "kept", "sampled_validity"))
+    same = {"tol": request.tol, "start": request.time} | dict.fromkeys(("limit", "dense", "kept", "sampled_validity"))
 
-    def motion(coordinates: Mapping[str, Any], velocity: Any) -> Motion | None:
+    def motion(system: System, coordinates: Mapping[str, Any], velocity: Any) -> Motion | None:
         value = coordinates.get(name)
         if type(value) is not float or type(velocity) is not float or len(coordinates) > 1:
             return None
@@ -130,13 +129,13 @@ def remember(request: MotionRequest, run: Program) -> None:
         AT_START.pack_into(memory, 0, local, first, mode, side, *rest)
         labels, values = events = EventBuffers(np.empty((size, 4), dtype=np.int64), np.empty((size, 3)))
         if kernel(np.ndarray((1,), MOTION, memory), state, env, model, NO_ROWS, (steps, events)) != Status.DONE:
-            kept.clear()
             return None
         now: Any = MotionNumbers._make(WHOLE_RECORD.unpack(memory))
         position, speed = state.tolist()
         count, mode = now.recorded_events, now.mode
         return motion_of(
             **same,
+            system=system,
             time=time_of(now),
             position=position,
             velocity=speed,

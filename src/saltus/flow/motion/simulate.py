@@ -276,7 +276,7 @@ def _like_the_last(system: Any, asked: tuple[Any, ...], coordinates: Mapping[str
         for again in plan.again:
             if again is not None and all(map(is_, plan.asked, asked)):
                 structure_key(system)  # as for every motion
-                return again(coordinates, velocity) if system._memory is memory else None
+                return again(system, coordinates, velocity) if system._memory is memory else None
     return None
 
 
