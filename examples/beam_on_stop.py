@@ -1,9 +1,9 @@
 """
-A beam of ten modes with a soft and with a hard stop
-====================================================
+A beam of ten modes on a soft stop
+==================================
 
-A cantilever shaken at its tip meets a stop at 1. At the soft one the branch has two folds, to which those of harmonic balance
-tend, and sweeps up and down jump there. At the hard one the sweep down jumps where the linear beam touches it.
+A cantilever shaken at its tip meets a spring at 1. The branch has two folds, to which those of harmonic balance tend, and sweeps
+up and down jump there. The same tip at a rigid stop is in the next example.
 """
 
 import matplotlib.pyplot as plt
@@ -17,10 +17,8 @@ w, tip = (roots / roots[0]) ** 2, 2 * (-1.0) ** np.arange(10)  # in units of the
 force, stiffness, damping, angles = 0.03, 0.5, 0.04 * w, np.linspace(0, 2 * np.pi, 1024, endpoint=False)
 beam = {"mass": np.eye(10), "damping": np.diag(damping), "stiffness": np.diag(w**2), "points": {"tip": tip}, "forces": {"f": tip}}
 load = saltus.Load(frequency=1.0, f=saltus.Harmonic(force, phase=np.pi / 2))
-stop = {"name": "stop", "coordinate": "tip", "position": 1.0}
-spring, wall = saltus.Surface(**stop, stiffness=stiffness), saltus.Contact(**stop, sign=-1)
-soft = saltus.System(model=saltus.Structure(**beam, surfaces=[spring]), load=load)
-hard = saltus.System(model=saltus.Structure(**beam, contacts=[wall]), load=load, impact=saltus.NewtonImpact(e=0.5))
+spring = saltus.Surface(name="stop", coordinate="tip", position=1.0, stiffness=stiffness)
+system = saltus.System(model=saltus.Structure(**beam, surfaces=[spring]), load=load)
 
 
 def linear(frequency):
@@ -44,17 +42,15 @@ def fold(harmonics, sign, sizes):
 
 
 touched = brentq(lambda frequency: abs(linear(frequency)) - 1.0, 1.0, 1.2, xtol=1e-14)
-branch = saltus.continue_orbit(saltus.find_orbit(soft, **soft.model.start()), "load.frequency", (0.93, 1.18))
+branch = saltus.continue_orbit(saltus.find_orbit(system, **system.model.start()), "load.frequency", (0.93, 1.18))
 folds = [point.parameter for point in branch.special if point.kind == "LP"]
 errors = np.abs([np.subtract([fold(n, -1.0, (2.3, 2.6)), fold(n, 1.0, (1.001, 1.1))], folds) for n in (3, 7, 15)])
-values, (_, axes) = np.linspace(0.96, 1.18, 12), plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
-saltus.plot(branch, ax=axes[0])
-for ax, system, name, falls in ((axes[0], soft, "soft stop", folds[1]), (axes[1], hard, "hard stop", touched)):
-    sweep = saltus.frequency_sweep(system, values, periods=80, stop_early=False, max_period=1, **system.model.start())
-    for row, way in enumerate(("up", "down")):
-        ax.plot(sweep.value, sweep.amplitude[row], "^v"[row], color="0.2", fillstyle="none", label=f"swept {way}")
-    ax.set(xlabel="frequency / first of the beam", ylabel="amplitude of the tip", title=name)
-    ax.legend()
-    assert np.array_equal(sweep.amplitude[1] > 1.0, sweep.value < falls)  # of all coordinates the tip goes furthest
-    assert system is hard or np.array_equal(sweep.amplitude[0] > 1.0, sweep.value < folds[0])
+values, (_, ax) = np.linspace(0.96, 1.18, 12), plt.subplots(layout="constrained")
+saltus.plot(branch, ax=ax)
+sweep = saltus.frequency_sweep(system, values, periods=80, stop_early=False, max_period=1, **system.model.start())
+for row, way in enumerate(("up", "down")):
+    ax.plot(sweep.value, sweep.amplitude[row], "^v"[row], color="0.2", fillstyle="none", label=f"swept {way}")
+    assert np.array_equal(sweep.amplitude[row] > 1.0, sweep.value < folds[row])  # of all coordinates the tip goes furthest
+ax.set(xlabel="frequency / first of the beam", ylabel="amplitude of the tip")
+ax.legend()
 assert np.all(errors < [[1e-3], [1e-4], [1e-5]])

@@ -390,6 +390,7 @@ LONGEST = {
     "ten_masses.py",
     "soft_stop.py",
     "beam_on_stop.py",
+    "beam_on_hard_stop.py",
     "identification.py",
     "overturning_spectrum.py",
     "rubbing_absorber.py",

@@ -6,7 +6,7 @@ from saltus.plots.conventions import LOOK, RC
 
 TASKS = (  # what people do after their first motion, named in the gallery's first paragraph
     *("preloaded_stop", "at2_record", "overturning_spectrum", "harvester", "identification", "basins"),
-    *("design_grid", "animation", "notebook", "mass_chain", "elastic_bar", "beam_on_stop", "ten_masses"),
+    *("design_grid", "animation", "notebook", "mass_chain", "elastic_bar", "beam_on_stop", "beam_on_hard_stop", "ten_masses"),
 )
 ORDER = (
     *("quickstart", *TASKS, "potential_wells", "coming_to_rest", "rocking_block", "housner", "overturning", "bilinear"),
