@@ -251,8 +251,8 @@ def simulate(
     '-0.235680595299 after 39 impacts'
     """
     asked = periods, duration, tol, time, side, stop_at, dense, times is None
-    if progress is silent and (motion := _like_the_last(system, asked, coordinates, velocity)) is not None:
-        return motion
+    if progress is silent and (known := _like_the_last(system, asked, coordinates, velocity)):
+        return known
     request = MotionRequest(
         system=system,
         coordinates=coordinates,
@@ -273,10 +273,9 @@ def _like_the_last(system: Any, asked: tuple[Any, ...], coordinates: Mapping[str
     """The motion, if this system was followed before with the same arguments but the start, and kept a way to do it again."""
     memory = getattr(system, "_memory", None)
     for plan in memory.get("plan", ()) if memory else ():
-        for again in plan.again:
-            if again is not None and all(map(is_, plan.asked, asked)):
-                structure_key(system)  # as for every motion
-                return again(system, coordinates, velocity) if system._memory is memory else None
+        for again in plan.again if all(map(is_, plan.asked, asked)) else ():
+            structure_key(system)  # as for every motion
+            return again(system, coordinates, velocity) if again and system._memory is memory else None
     return None
 
 
