@@ -400,6 +400,8 @@ LONGEST = {
     "design_grid.py",
     "cell_chain.py",
     "shaken_table.py",
+    "belt.py",
+    "smoothing.py",
 }  # seconds each; the gallery of `make docs` runs all of them
 
 

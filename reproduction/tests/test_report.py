@@ -16,7 +16,7 @@ from PIL import Image
 
 from saltus import ParameterError
 from saltus.files import read_dataset, write_dataset
-from saltus_paper import FIGURES, ClaimVerdict, report_from_results, reproduce
+from saltus_paper import FIGURES, ClaimVerdict, report_from_results
 from saltus_paper import up_to_date as state
 from saltus_paper.claims.claim import judge_claim, measured
 from saltus_paper.claims.claim_tables import ClaimEntry, ListForm, Origin, claim_tables
@@ -51,13 +51,6 @@ class Page(HTMLParser):
 
     def values(self, attribute, *tags):
         return [attrs[attribute] for tag, attrs in self.elements if attribute in attrs and (not tags or tag in tags)]
-
-
-@pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("results")
-    reproduce(PARTS, folder)
-    return folder
 
 
 @pytest.fixture(scope="module")

@@ -6,17 +6,10 @@ import shutil
 import pytest
 from browser_page import BrowserPage
 
-from saltus_paper import report_as_pdf, reproduce
+from saltus_paper import report_as_pdf
 from saltus_paper.report import browser
 
 SHOWN = "[...document.querySelectorAll('.claim')].filter((one) => one.offsetParent !== null)"
-
-
-@pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("results")
-    reproduce(["fig02", "fig08", "table1"], folder)
-    return folder
 
 
 @pytest.fixture(scope="module")

@@ -305,7 +305,7 @@ def test_an_orbit_that_rests_on_a_table_is_thrown_where_the_table_falls_faster()
         saltus.stable_manifold(orbit)
 
 
-@pytest.mark.parametrize("e", [0.6, 0.3])
+@pytest.mark.parametrize("e", [0.6, pytest.param(0.3, marks=pytest.mark.thorough)])
 def test_a_bounce_of_period_one_is_born_and_doubled_where_its_closed_form_says(e):
     """With g = Omega = 1 it is born at a = pi (1 - e) / (1 + e), where the table must give back all that impacts take, and
     doubles where a^2 = [pi (1 - e) / (1 + e)]^2 + [2 (1 + e^2) / (1 + e)^2]^2 (Holmes 1982; Luo and Han 1996)."""

@@ -94,7 +94,12 @@ def follow(system, theta, duration=12.0, **more):
 
 
 @pytest.mark.parametrize(
-    ("cells", "impact"), [(5, NewtonImpact(e=0.4)), (3, NewtonImpact(e=0.2, transfer=0.5)), (3, VelocityReduction(0.9))]
+    ("cells", "impact"),
+    [
+        pytest.param(5, NewtonImpact(e=0.4), marks=pytest.mark.thorough),
+        (3, NewtonImpact(e=0.2, transfer=0.5)),
+        pytest.param(3, VelocityReduction(0.9), marks=pytest.mark.thorough),
+    ],
 )
 def test_cells_without_coupling_move_as_each_by_itself(cells, impact):
     system, theta = chain(cells, coupling=0.0, impact=impact), state(cells)
@@ -123,7 +128,7 @@ def test_a_chain_keeps_its_energy_without_damping_and_with_lossless_impacts():
     np.testing.assert_allclose(energy, energy[0], rtol=0, atol=1e-11)
 
 
-@pytest.mark.parametrize("cells", [2, 4])
+@pytest.mark.parametrize("cells", [2, pytest.param(4, marks=pytest.mark.thorough)])
 def test_a_chain_looks_the_same_from_its_other_end(cells):
     system, theta = chain(cells), state(cells, seed=3)
     ahead = follow(system, theta)
@@ -262,7 +267,12 @@ def test_equations_of_64_coordinates_compile_in_less_than_a_minute():
 
 
 @pytest.mark.parametrize(
-    ("cells", "impact"), [(2, NewtonImpact(e=0.4)), (2, VelocityReduction(0.9)), (4, NewtonImpact(e=0.0, transfer=0.3))]
+    ("cells", "impact"),
+    [
+        (2, NewtonImpact(e=0.4)),
+        pytest.param(2, VelocityReduction(0.9), marks=pytest.mark.thorough),
+        (4, NewtonImpact(e=0.0, transfer=0.3)),
+    ],
 )
 def test_chains_in_lanes_are_the_scalar_motions(cells, impact):
     """Impacts of one contact while others are closed or open, in lanes and one by one: to 1e-9 over two forcing periods."""

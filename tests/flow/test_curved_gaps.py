@@ -334,6 +334,7 @@ def test_a_body_that_slides_in_a_curved_valley_swings_as_its_own_equation_has_it
     assert np.ptp(0.5 * (v**2).sum(axis=0) + q[1]) < 1e-13
 
 
+@pytest.mark.thorough
 def test_a_body_in_a_valley_that_shakes_swings_at_half_the_frequency():
     """Parametrically, held on the ground: of its four multipliers two are 0, and two have the product exp(-c T)."""
     load = Load(frequency=1.0, ground=saltus.Harmonic(amplitude=0.85))

@@ -37,7 +37,7 @@ def reference(request):
     return cases, cases.in_lanes(threads=1, **OPTIONS)
 
 
-@pytest.mark.parametrize("threads", [1, 2, 3, 7])
+@pytest.mark.parametrize("threads", [1, 2, pytest.param(3, marks=pytest.mark.thorough), 7])
 def test_threads_change_nothing(reference, threads):
     cases, expected = reference
     same_bits(cases.in_lanes(threads=threads, **OPTIONS), expected)
@@ -57,7 +57,9 @@ def test_neighbours_change_nothing(reference):
     same_bits(cases.chosen(rows).in_lanes(**OPTIONS), expected.isel(trajectory=rows))
 
 
-@pytest.mark.parametrize(("smallest", "largest"), [(1, 1), (7, 7), (1, 1000), (10**6, 10**6)])
+@pytest.mark.parametrize(
+    ("smallest", "largest"), [(1, 1), pytest.param(7, 7, marks=pytest.mark.thorough), (1, 1000), (10**6, 10**6)]
+)
 def test_chunks_change_nothing(reference, smallest, largest, monkeypatch):
     cases, expected = reference
     settings = replace(lanes_run.SETTINGS, smallest_chunk=smallest, largest_chunk=largest)

@@ -231,7 +231,7 @@ def test_the_parameter_turns_only_at_folds_and_grazings(name):
     assert len(turns) <= len(kinds(found, "LP", "GR"))
 
 
-@pytest.mark.parametrize("step", [0.02, 0.3])
+@pytest.mark.parametrize("step", [pytest.param(0.02, marks=pytest.mark.thorough), 0.3])
 @pytest.mark.parametrize("name", ["Hhat 0.5", "unequal layers", "impact oscillator"])
 def test_special_points_do_not_depend_on_the_step(name, step):
     found = branch(name)

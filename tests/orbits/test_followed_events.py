@@ -363,6 +363,7 @@ class Ledge(saltus.ContactModel):
         return spring, -0.03 * sin(0.5) - 0.05 * q[1], -0.03 * cos(0.5)
 
 
+@pytest.mark.thorough
 def test_a_branch_ends_by_name_where_sliding_stops_just_as_impacts_die_away():
     load = saltus.Load(frequency=1.01, force=saltus.Harmonic(0.05))
     system = saltus.System(model=Ledge(), load=load, impact=saltus.NewtonImpact(e=0.4))

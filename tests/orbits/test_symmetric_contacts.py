@@ -199,7 +199,9 @@ def test_where_the_layers_lose_their_symmetry_two_branches_begin(breaking: saltu
         assert max(orbit.residual for orbit in branch.orbits) < 1e-9
 
 
-@pytest.mark.parametrize(("name", "kind", "start"), [("mirrored", "LP", 0.1), ("breaking", "BPC", 0.2)])
+@pytest.mark.parametrize(
+    ("name", "kind", "start"), [pytest.param("mirrored", "LP", 0.1, marks=pytest.mark.thorough), ("breaking", "BPC", 0.2)]
+)
 def test_special_points_of_the_layers_lie_on_their_curves(
     name: str, kind: str, start: float, request: pytest.FixtureRequest
 ) -> None:

@@ -93,6 +93,7 @@ def test_bands_exclude_long_transients_and_the_more_so_beside_transients():
     assert beside  # such transients are longer than those that the first judgement excludes
 
 
+@pytest.mark.thorough
 def test_a_quick_effort_halves_brackets_less_far():
     """To a thousandth of the range where "standard" goes on to a tenth of that; the edge is that of the band above."""
     low, high = 0.35, 0.37

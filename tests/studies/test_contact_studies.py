@@ -166,9 +166,10 @@ def test_a_cell_whose_only_motion_has_a_longer_period_than_is_looked_for_is_not_
         assert outcome.attrs["flag_meanings"].split()[int(outcome[0, 0])] == words
 
 
+@pytest.mark.thorough
 def test_a_search_finds_the_orbit_of_both_layers_and_says_what_it_searched():
     """The stable orbit of the reduced model at H = 0.1, and no other of one period."""
-    both, reduced = (search_orbits(layers(model), H, [0.1], max_period=1, starts=4) for model in (TwoLayer, Metainterface))
+    both, reduced = (search_orbits(layers(model), H, [0.1], max_period=1, starts=8) for model in (TwoLayer, Metainterface))
     stable = [[orbit.amplitude for orbit in search.orbits if orbit.stable] for search in (both, reduced)]
     np.testing.assert_allclose(stable[0], stable[1], rtol=0, atol=1e-9)
     assert len(both.window) == 4

@@ -113,6 +113,7 @@ def test_what_a_diagram_leaves_out_is_in_its_estimate(diagram):
     assert "longer" in small["unplaced"]["reason"].values
 
 
+@pytest.mark.thorough
 def test_motions_of_long_periods_are_followed_where_random_ones_end_on_them():
     """On a ground that moves by 0.5 one of nine forcing periods takes a quarter of the states."""
     system = under(ground_horizontal=Harmonic(0.5), vertical=-0.5)

@@ -2,9 +2,12 @@
 
 import json
 
+import pytest
+
 DATA = 8 * 8 * 900_000 / 2**20  # MB more that the larger sweep writes
 
 
+@pytest.mark.thorough
 def test_a_million_rows_need_no_more_memory_than_a_tenth_of_them(script, tmp_path):
     peaks = []
     for rows in (100_000, 1_000_000):
