@@ -243,7 +243,7 @@ def test_cells_that_move_alike_move_as_one_for_any_number_of_them(cells):
 def test_equations_of_many_coordinates_move_alike_without_the_passes_of_llvm(monkeypatch):
     """The order of operations stays, and so the motion up to rounding; what is compiled so depends on the coordinates."""
     assert [is_long(trace(chain(cells))) for cells in (3, 4, 5)] == [False, False, True]
-    assert [is_long(trace(chain(cells), sensitivities=())) for cells in (2, 3)] == [False, True]
+    assert [is_long(trace(chain(cells), sensitivities=())) for cells in (2, 4, 5)] == [False, False, True]
     theta, made, codes = state(2), [], set()
     for most in (LIMITS.optimised, 0):
         monkeypatch.setattr("saltus.taylor.graph.LIMITS", replace(LIMITS, optimised=most))
@@ -264,6 +264,16 @@ def test_equations_of_64_coordinates_compile_in_less_than_a_minute():
     traced = trace(system)
     assert object_code(llvm_text(compiled.structure_functions(traced)), is_long(traced))
     assert time.process_time() - began < 60.0
+
+
+def test_derivatives_of_each_further_cell_add_the_same_text():
+    """Their columns are one loop, and matrices are written for their entries alone: the code grows as the number of cells."""
+    length = {}
+    for cells in (2, 3, 4):
+        functions = compiled.structure_functions(trace(chain(cells), sensitivities=("model.coupling",)))
+        length[cells] = np.array([len(llvm_text([each])) for each in functions])
+    first, second = length[3] - length[2], length[4] - length[3]
+    np.testing.assert_allclose(second, first, rtol=0.02, atol=200)  # one is 2 % longer where numbers get a digit more
 
 
 @pytest.mark.parametrize(

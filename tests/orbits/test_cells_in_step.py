@@ -71,6 +71,34 @@ def test_multipliers_of_cells_that_close_alike_are_those_of_their_motion() -> No
         assert np.abs(found - multiplier).min() < 1e-7
 
 
+@pytest.mark.thorough
+def test_multipliers_of_eight_cells_are_those_of_differences_of_motions() -> None:
+    """Without restitution a cell has one layer open at a time: eight angles and their rates move."""
+    load = saltus.Load(frequency=1.0, vertical=-0.5, horizontal=saltus.Harmonic(amplitude=0.15))
+    model = saltus.CellChain(beta0=BETA80, cells=8, coupling=0.5, damping=0.1)
+    system = saltus.System(model=model, load=load, impact=saltus.NewtonImpact(e=0.0))
+    places = {name: 0.4 if name.startswith("lower") else 0.0 for name in model.coordinates}
+    orbit = saltus.find_orbit(system, **places, velocity=(0.0,) * 16)
+    start, moves, step = orbit.start(), [name for name in model.coordinates if name.startswith("lower")], 1e-6
+    lower, columns = np.arange(0, 16, 2), []
+    own = np.concatenate([lower, 16 + lower])
+    for place in range(16):
+        ends = []
+        for sign in (1.0, -1.0):
+            given = dict(start)
+            velocity = np.array(given.pop("velocity"))
+            if place < 8:
+                given[moves[place]] += sign * step
+            else:
+                velocity[lower[place - 8]] += sign * step
+            motion = saltus.simulate(system, **given, velocity=tuple(velocity), periods=1, tol=1e-14, dense=False)
+            ends.append(np.ravel(motion.final_state)[own])
+        columns.append((ends[0] - ends[1]) / (2 * step))
+    expected = np.linalg.eigvals(np.transpose(columns))
+    for multiplier in expected:
+        assert np.abs(orbit.multipliers - multiplier).min() < 1e-6
+
+
 def test_multipliers_are_the_rate_at_which_a_motion_beside_it_comes_back(in_step: saltus.PeriodicOrbit) -> None:
     """The first and the last cell pushed apart: the slowest motion against each other has the largest multiplier."""
     largest = np.abs(in_step.multipliers).max()

@@ -2,6 +2,7 @@ from .cache import cache_directory as cache_directory
 from .cache import digest as digest
 from .cache import kept_bytes as kept_bytes
 from .cache import source_of as source_of
+from .cache import structure_key as structure_key
 from .exact_algebra import Form as Form
 from .exact_algebra import NoNormalForm as NoNormalForm
 from .exact_algebra import constant as constant
@@ -13,7 +14,6 @@ from .generated import WrittenFunction as WrittenFunction
 from .generated import equations_of as equations_of
 from .generated import llvm_text as llvm_text
 from .generated import load_functions as load_functions
-from .generated import structure_key as structure_key
 from .graph import RECORD_WIDTH as RECORD_WIDTH
 from .graph import Expr as Expr
 from .graph import check_size as check_size

@@ -3,7 +3,7 @@
 A file's name has a digest of all that its content depends on, so that a change of it makes a new file. A file is put into its
 place in one step, and of processes that want the same one a single one makes it. Code from the cache is run only if the folder
 belongs to the user and the file is as it was written: compiled code, Python's, numba's and LLVM's, is compared with its digest.
-Damaged files are made again, with a remark.
+Damaged files are made again, with a remark. Within a process traces are known by the key of their structure.
 """
 
 from __future__ import annotations
@@ -17,14 +17,18 @@ import shutil
 import stat
 import tempfile
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from importlib.abc import InspectLoader
 from pathlib import Path
-from types import ModuleType
-from typing import cast
+from types import FunctionType, ModuleType
+from typing import Any, cast
 
+import numpy as np
+
+from saltus.errors import ParameterError
 from saltus.files import lock
+from saltus.systems import Record, System, children, is_number
 
 NOBODY = 65534  # the user to whom, inside a container, the files of the superuser outside belong
 DIGEST = hashlib.sha256().digest_size  # bytes
@@ -193,3 +197,72 @@ def write(path: Path, content: bytes) -> None:
         with contextlib.suppress(OSError):
             os.unlink(temporary)
         raise
+
+
+# --- the key of a structure -----------------------------------------------------------------------------------------------------
+
+
+def structure_key(system: System) -> Any:
+    """A key of a system's structure, under which traces are kept: the types of its parts, the values that these read from their
+    modules, and all of their fields that are no numbers. If these values have changed, the system remembers nothing."""
+    spaces, read, key = system._remembered("structure", lambda: ((s := tuple(_spaces(system))), _values(s), _key(system)))
+    if _values(spaces) == read:
+        return key
+    vars(system).pop("_memory", None)
+    return structure_key(system)
+
+
+def _spaces(node: Any) -> Iterator[tuple[Mapping[str, Any], str]]:
+    parts: dict[str, Any] = {} if isinstance(node, Record) else children(node)
+    kind: Any = type(node)
+    if parts:
+        yield from _outside(kind)
+    for part in parts.values():
+        if type(part) is not float:
+            yield from _spaces(part)
+
+
+def _values(spaces: tuple[tuple[Mapping[str, Any], str], ...]) -> tuple[Any, ...]:
+    return tuple(space.get(name) for space, name in spaces)
+
+
+def _key(node: Any) -> Any:
+    kind: Any
+    if isinstance(node, Record):  # its samples and its scale are numbers; the file that they came from does not matter
+        return Record, node.quantity
+    parts, kind = children(node), type(node)
+    if hasattr(kind, "structure_key"):  # of what holds numbers that are no fields
+        return node.structure_key
+    if parts:
+        named = [(name, float if type(part) is float else _key(part)) for name, part in parts.items()]
+        return kind, _values(_outside(kind)), tuple(named)
+    if is_number(node):
+        return float
+    if isinstance(node, np.ndarray):
+        return node.shape, node.dtype.str, node.tobytes()
+    if type(node).__hash__ is None:
+        raise ParameterError(f"a model cannot keep a {type(node).__name__}, got {node!r}; give it numbers, an array or a tuple")
+    return node
+
+
+@cache
+def _outside(cls: type) -> tuple[tuple[Mapping[str, Any], str], ...]:
+    """The names and namespaces of values that the methods of a user's class read from its module or class; a trace contains these
+    values."""
+    found: dict[tuple[int, str], tuple[Mapping[str, Any], str]] = {}
+    owners = [owner for owner in cls.__mro__ if owner.__module__.partition(".")[0] not in ("saltus", "builtins")]
+    waiting = [value for owner in owners for value in vars(owner).values()]
+    seen: set[int] = set()
+    for owner in owners:
+        found |= {(id(owner), name): (vars(owner), name) for name, value in vars(owner).items() if is_number(value)}
+    while waiting:
+        function = getattr(waiting[-1], "fget", None) or getattr(waiting[-1], "__func__", waiting[-1])
+        waiting.pop()
+        if not isinstance(function, FunctionType) or id(function) in seen:
+            continue
+        seen.add(id(function))
+        space = function.__globals__
+        named = [name for name in function.__code__.co_names if name in space]
+        found |= {(id(space), name): (space, name) for name in named if is_number(space[name])}
+        waiting += [space[name] for name in named]  # functions that it calls
+    return tuple(found.values())

@@ -11,41 +11,78 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
-from types import FunctionType
 from typing import Any, NamedTuple
 
 import llvmlite
-import numpy as np
 from llvmlite import binding, ir
 
-from saltus.errors import ParameterError, SaltusError
-from saltus.systems import Record, System, children, is_number
+from saltus.errors import SaltusError
+from saltus.systems import System
 from saltus.taylor import graph, load_tables, memory, numba_types, rules, series, vectors
-from saltus.taylor.cache import digest, kept_bytes, loading, source_of
+from saltus.taylor.cache import digest, kept_bytes, loading, source_of, structure_key
 from saltus.taylor.graph import LEAVES, Expr
 from saltus.taylor.kernels import told_before
-from saltus.taylor.memory import Memory, Place, Places, Tape, tape
+from saltus.taylor.memory import ColumnSum, Constants, Memory, Node, Place, Places, Tape, tape
 from saltus.taylor.numba_types import Pointer, given_arguments, result_count, written_function, written_type
 from saltus.taylor.rules import FUNCTIONS
 from saltus.taylor.series import Rows, Series
 from saltus.taylor.tracing import Trace, trace
-from saltus.taylor.vectors import CACHE_LINE, LONG, Arithmetic, Vec, add, multiply, subtract
+from saltus.taylor.vectors import CACHE_LINE, LONG, Arithmetic, ColumnInputs, Vec, add, loop, multiply, subtract
 
 ARITHMETIC: dict[str, Callable[[Any, Any], Any]] = {"add": add, "sub": subtract, "mul": multiply, "div": lambda a, b: a / b}
 SIGNS = {"greater": ">", "less": "<", "greater_equal": ">=", "less_equal": "<="}
 MIRRORED = str.maketrans("<>", "><")
 
 
+class ColumnNumber(NamedTuple):
+    """A number of each column of a tangent: a `ColumnSum` whose parts are values of the nodes of a tape."""
+
+    target: Place  # of the first column's, behind which those of the others lie `stride` apart
+    stride: int
+    terms: Sequence[tuple[Node, int]]  # (leaf, slope)
+    pushes: Sequence[int | None]
+    over: int | None
+
+
+class ColumnNumbers(NamedTuple):
+    """The numbers of the columns of a model of so many coordinates."""
+
+    dof: int
+    columns: int
+    numbers: Sequence[ColumnNumber]
+
+
 @dataclass(frozen=True)
 class Case:
-    """The roots that a function of an instant computes if its arguments named in `when` have the given values."""
+    """What a function of an instant computes if its arguments named in `when` have the given values: the roots of a tape, or
+    numbers of the columns of a tangent from its nodes."""
 
     tape: Tape
     targets: Sequence[Place | None]  # where each root is stored; None: it is returned by the function
     when: Sequence[tuple[str, int]] = ()
+    numbers: ColumnNumbers | None = None
+
+    @property
+    def leaves(self) -> set[str]:
+        """The kinds of leaves that it reads."""
+        numbers = () if self.numbers is None else self.numbers.numbers
+        return {node[0] for node in self.tape.nodes} | {leaf[0] for each in numbers for leaf, _ in each.terms}
+
+    @classmethod
+    def of_columns(
+        cls, trace: Trace, sums: Mapping[tuple[Place, int], ColumnSum], known: Constants, when: Sequence[tuple[str, int]] = ()
+    ) -> Case:
+        """The case that fills numbers of all columns, each from the place of the first column's on, and so far apart."""
+        written = tape([x for each in sums.values() for x in each.expressions], known)
+        roots, numbers = iter(written.roots), list[ColumnNumber]()
+        for (target, stride), each in sums.items():
+            terms = [((leaf.op, leaf.value), next(roots)) for leaf, _ in each.terms]
+            pushes = [None if push is None else next(roots) for push in each.pushes]
+            numbers.append(ColumnNumber(target, stride, terms, pushes, None if each.over is None else next(roots)))
+        return cls(replace(written, roots=[]), [], when, ColumnNumbers(trace.dof, trace.columns, numbers))
 
 
 class SeriesOf(NamedTuple):
@@ -111,22 +148,44 @@ def _write_case(memory: Memory, case: Case) -> list[Any]:
 
 def _store(memory: Memory, case: Case) -> list[Any]:
     """Compute a case's roots, put them into memory, and return LLVM's values of those that are results."""
-    values = list(zip(case.targets, instant(memory, case.tape), strict=True))
+    nodes = _instant(memory, case.tape)
+    if case.numbers is not None:
+        _store_numbers(memory, nodes, case.numbers)
+    values = list(zip(case.targets, [nodes[root] for root in case.tape.roots], strict=True))
     for target, value in values:
         if target is not None:
             memory.store(target, value)
     return [memory.value(value) for target, value in values if target is None]
 
 
+def _store_numbers(memory: Memory, nodes: list[Any], given: ColumnNumbers) -> None:
+    """Compute the numbers of all columns, in a loop over them, and put them into memory."""
+    b, pushes = memory.builder, ColumnInputs(memory, given.columns, [each.pushes for each in given.numbers])
+    pushes.store(nodes.__getitem__)
+    with loop(b, 0, given.columns) as column:
+        for i, each in enumerate(given.numbers):
+            total: Any = pushes.of(i, column)
+            for leaf, slope in each.terms:
+                total = add(total, multiply(nodes[slope], memory.of_column(leaf, given.dof, column)))
+            place = b.gep(memory.pointer(each.target), [b.mul(column, LONG(each.stride))])
+            b.store(memory.value(total if each.over is None else total / nodes[each.over]), place).align = 8
+
+
 def instant(memory: Memory, tape: Tape) -> list[Vec | float]:
     """The roots' numbers at the time and state that the leaves have."""
+    nodes = _instant(memory, tape)
+    return [nodes[root] for root in tape.roots]
+
+
+def _instant(memory: Memory, tape: Tape) -> list[Any]:
+    """The numbers of all nodes at the time and state that the leaves have."""
     values: list[Any] = []
     for node in tape.nodes:
         if node[0] in (*LEAVES, "constant"):
             values.append(memory.leaf(node))
         else:
             values.append(_operation(memory, node[0], [values[i] for i in node[1:]]))
-    return [values[root] for root in tape.roots]
+    return values
 
 
 def _operation(memory: Memory, op: str, args: list[Any]) -> Any:
@@ -339,72 +398,3 @@ def _text(traced: Trace, roots: list[Expr]) -> str:
     written = tape(roots)
     nodes = [(node[0], paths[node[0]][node[1]]) if node[0] in paths else node for node in written.nodes]
     return repr((nodes, written.roots))
-
-
-# --- the key of a structure -----------------------------------------------------------------------------------------------------
-
-
-def structure_key(system: System) -> Any:
-    """A key of a system's structure, under which traces are kept: the types of its parts, the values that these read from their
-    modules, and all of their fields that are no numbers. If these values have changed, the system remembers nothing."""
-    spaces, read, key = system._remembered("structure", lambda: ((s := tuple(_spaces(system))), _values(s), _key(system)))
-    if _values(spaces) == read:
-        return key
-    vars(system).pop("_memory", None)
-    return structure_key(system)
-
-
-def _spaces(node: Any) -> Iterator[tuple[Mapping[str, Any], str]]:
-    parts: dict[str, Any] = {} if isinstance(node, Record) else children(node)
-    kind: Any = type(node)
-    if parts:
-        yield from _outside(kind)
-    for part in parts.values():
-        if type(part) is not float:
-            yield from _spaces(part)
-
-
-def _values(spaces: tuple[tuple[Mapping[str, Any], str], ...]) -> tuple[Any, ...]:
-    return tuple(space.get(name) for space, name in spaces)
-
-
-def _key(node: Any) -> Any:
-    kind: Any
-    if isinstance(node, Record):  # its samples and its scale are numbers; the file that they came from does not matter
-        return Record, node.quantity
-    parts, kind = children(node), type(node)
-    if hasattr(kind, "structure_key"):  # of what holds numbers that are no fields
-        return node.structure_key
-    if parts:
-        named = [(name, float if type(part) is float else _key(part)) for name, part in parts.items()]
-        return kind, _values(_outside(kind)), tuple(named)
-    if is_number(node):
-        return float
-    if isinstance(node, np.ndarray):
-        return node.shape, node.dtype.str, node.tobytes()
-    if type(node).__hash__ is None:
-        raise ParameterError(f"a model cannot keep a {type(node).__name__}, got {node!r}; give it numbers, an array or a tuple")
-    return node
-
-
-@cache
-def _outside(cls: type) -> tuple[tuple[Mapping[str, Any], str], ...]:
-    """The names and namespaces of values that the methods of a user's class read from its module or class; a trace contains these
-    values."""
-    found: dict[tuple[int, str], tuple[Mapping[str, Any], str]] = {}
-    owners = [owner for owner in cls.__mro__ if owner.__module__.partition(".")[0] not in ("saltus", "builtins")]
-    waiting = [value for owner in owners for value in vars(owner).values()]
-    seen: set[int] = set()
-    for owner in owners:
-        found |= {(id(owner), name): (vars(owner), name) for name, value in vars(owner).items() if is_number(value)}
-    while waiting:
-        function = getattr(waiting[-1], "fget", None) or getattr(waiting[-1], "__func__", waiting[-1])
-        waiting.pop()
-        if not isinstance(function, FunctionType) or id(function) in seen:
-            continue
-        seen.add(id(function))
-        space = function.__globals__
-        named = [name for name in function.__code__.co_names if name in space]
-        found |= {(id(space), name): (space, name) for name in named if is_number(space[name])}
-        waiting += [space[name] for name in named]  # functions that it calls
-    return tuple(found.values())

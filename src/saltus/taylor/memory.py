@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from saltus.taylor.graph import RECORD_WIDTH, Expr, combine, differentiate, number, ordered, substitute
+from saltus.taylor.graph import RECORD_WIDTH, Expr, combine, number, ordered, substitute
 from saltus.taylor.load_tables import expand_record
 from saltus.taylor.numba_types import Array
 from saltus.taylor.rules import FUNCTIONS
@@ -176,13 +176,24 @@ class Memory:
         name, first = self.leaves[op]
         return self.load((name, first + (index[0] if index else 0)))
 
-    def _sum_over_modes(self, form: ModeSum) -> Vec:
-        """A sum over modes at an instant."""
+    def of_column(self, leaf: Node, dof: int, column: Any) -> Vec:
+        """What LLVM's column of a tangent has in a leaf's place, in the state of a model of so many coordinates."""
+        b, (op, *index) = self.builder, leaf
+        offset = column if op == "shift" else b.mul(LONG(dof), b.add(column, LONG(1)))
+        if op == "form":
+            return self._sum_over_modes(index[0], offset)
+        name, first = self.leaves[op]
+        own = self.pointer((name, first + (0 if op == "shift" else index[0])))
+        return Vec(b, self.load_from(b.gep(own, [offset])), self.arithmetic)
+
+    def _sum_over_modes(self, form: ModeSum, offset: Any = None) -> Vec:
+        """A sum over modes at an instant, of the motion, or of a column whose state lies so far behind its own."""
         b, data, parts = self.builder, self.pointer(self.leaves["datum"]), list[tuple[Any, int]]()
         for op, place in (("coordinate", form.amplitudes), ("velocity", form.rates)):
             if place is not None:
                 name, first = self.leaves[op]
-                parts.append((self.pointer((name, first + form.first)), place))
+                state = self.pointer((name, first + form.first))
+                parts.append((state if offset is None else b.gep(state, [offset]), place))
         after = list[Vec]()
         with loop(b, 0, self.whole(data), [self.arithmetic.number(b, 0.0)], after) as (i, (total,)):
             for state, place in parts:
@@ -231,7 +242,7 @@ class Memory:
         return time + self.leaf(("origin",)) - Vec(self.builder, anchor, self.arithmetic)
 
 
-# --- many modes, whose equations are written as loops (`ModeLoops` in `rules.py`) --------------------------------------------
+# --- modes and columns of a tangent, whose equations are written as loops (`Loops` in `rules.py`) ----------------------------
 
 # The modes of a linear structure obey
 #
@@ -279,15 +290,6 @@ class ModeBlock:
     forms: tuple[ModeSum, ...]
     inputs: tuple[ModeInput, ...]
     columns: tuple[tuple[ModeInput, ...], ...] = ()  # of each column of the tangent, besides the inputs that are local
-    # Of the acceleration of each local coordinate: its derivatives to what it depends on, which are constant. With them the local
-    # equations of all columns are one loop, where each column may have other terms.
-    slopes: tuple[tuple[tuple[Expr, Expr], ...], ...] = ()
-    pushes: tuple[tuple[Expr, ...], ...] = ()
-
-    @property
-    def dof(self) -> int:
-        """The number of all coordinates of the structure."""
-        return self.first + self.count
 
     @property
     def data(self) -> int:
@@ -297,51 +299,64 @@ class ModeBlock:
     @property
     def expressions(self) -> list[Expr]:
         """The inputs that are expressions, of the motion and then of the columns."""
-        inputs = [each.of for each in (*self.inputs, *(x for column in self.columns for x in column)) if not each.local]
-        return [*inputs, *(slope for row in self.slopes for _, slope in row), *(x for column in self.pushes for x in column)]
+        return [each.of for each in (*self.inputs, *(x for column in self.columns for x in column)) if not each.local]
 
     def written_out(self, place: int) -> Expr:
-        """The acceleration at a place among all coordinates, those of the columns included, as an expression."""
-        column, own = divmod(place, self.dof)
-        base, i = column * self.dof, own - self.first
-        if i < 0:
-            return self._local_written_out(column, own)
+        """The acceleration of a mode at its place among the coordinates, as an expression."""
+        i = place - self.first
         total = -(self._datum(i, self.square) * Expr("coordinate", (), place))
         if self.damping is not None and not self.coupled:
             total = total - self._datum(i, self.damping) * Expr("velocity", (), place)
         for k in range(self.count if self.coupled else 0):
-            total = total - self._datum(self.count, i * self.count + k) * Expr("velocity", (), base + self.first + k)
-        for each in (*self.inputs, *(self.columns[column - 1] if column else ())):
-            if column and not each.local and each in self.inputs:
-                continue
-            of = Expr(each.of.op, (), base + each.of.value) if each.local else each.of
-            total = total + each.sign * (self._datum(i, each.place) * of)
-        return total
-
-    def _local_written_out(self, column: int, i: int) -> Expr:
-        """The acceleration of a local coordinate of a column."""
-        pushed, base = self.pushes[column - 1], column * self.dof
-        total = pushed[i] if pushed else number(0.0)
-        for leaf, slope in self.slopes[i]:
-            form = leaf.op == "form"
-            shifted = leaf.value._replace(first=leaf.value.first + base) if form else leaf.value + base
-            total = total + slope * Expr(leaf.op, (), shifted)
+            total = total - self._datum(self.count, i * self.count + k) * Expr("velocity", (), self.first + k)
+        for each in self.inputs:
+            total = total + each.sign * (self._datum(i, each.place) * each.of)
         return total
 
     def _datum(self, mode: int, place: int) -> Expr:
         return Expr("datum", (), 1 + mode * self.record + place)
 
 
-@dataclass(frozen=True)
-class ModeRows:
-    """Where the series of modes lie: the places of the first coordinate's, and how many columns have accelerations kept."""
+class ColumnSum(NamedTuple):
+    """A number that each column of a tangent has: the sum over leaves of the slope to it times what the column has in its place,
+    and what is pushed in the columns of parameters; divided by `over`, if it is given."""
 
-    block: ModeBlock
+    terms: tuple[tuple[Expr, Expr], ...]  # (leaf, slope)
+    pushes: tuple[Expr | None, ...]  # of the last columns; None: nothing
+    over: Expr | None = None
+
+    @classmethod
+    def of(cls, terms: Sequence[tuple[Expr, Expr]], pushes: Sequence[Expr], over: Expr | None) -> ColumnSum:
+        """The sum without what is 0."""
+        pushed = tuple(None if push is number(0.0) else push for push in pushes)
+        return cls(tuple(term for term in terms if term[1] is not number(0.0)), pushed, over)
+
+    @property
+    def expressions(self) -> list[Expr]:
+        """All that is computed once for all columns."""
+        pushes = [push for push in self.pushes if push is not None]
+        return [*(slope for _, slope in self.terms), *pushes, *([] if self.over is None else [self.over])]
+
+
+@dataclass(frozen=True)
+class LoopRows:
+    """The equations that are loops over modes and the columns of a tangent, and the places of the first coordinate's series."""
+
     positions: tuple[str, int]
     velocities: tuple[str, int]
     accelerations: tuple[str, int]
+    dof: int = field(repr=False)  # of the model; that of modes is a number of the code's memory
     columns: int  # of the tangent
-    kept: int  # 1 + the number of columns whose accelerations are kept
+    with_accelerations: bool  # whether those of the columns are kept
+    modes: ModeBlock | None
+    sums: tuple[ColumnSum, ...]  # the accelerations of the local coordinates of the columns
+    first_order: tuple[int, ...]  # those of them that are velocities
+
+    @property
+    def expressions(self) -> list[Expr]:
+        """The series of the motion that the loops read."""
+        own = [] if self.modes is None else self.modes.expressions
+        return [*own, *(x for each in self.sums for x in each.expressions)]
 
 
 class LocalPart(tuple[Expr, ...]):
@@ -375,10 +390,7 @@ def mode_block(equations: Any, first: int, count: int, sums: Sequence[ModeSum]) 
 
 def without_modes(root: Expr, block: ModeBlock) -> Expr:
     """An expression in which no accelerations of modes are leaves."""
-    leaves: dict[Expr, Any] = {}
-    for node in ordered([root]):
-        if node.op == "mode":
-            leaves[node] = block.written_out(node.value)
+    leaves: dict[Expr, Any] = {node: block.written_out(node.value) for node in ordered([root]) if node.op == "mode"}
     return substitute(root, leaves) if leaves else root
 
 
@@ -386,11 +398,3 @@ def leaves_of(root: Expr) -> list[Expr]:
     """What of the state an expression depends on, in an order that is always the same."""
     leaves = {node for node in ordered([root]) if node.op in ("coordinate", "velocity", "form")}
     return sorted(leaves, key=lambda leaf: (leaf.op == "form", leaf.value, leaf.op))
-
-
-def local_slopes(accelerations: Sequence[Expr]) -> tuple[tuple[tuple[Expr, Expr], ...], ...]:
-    """The derivatives of local accelerations to all that they depend on, each with its leaf; they do not change in time, as the
-    equations of a structure are linear on each side of its surfaces."""
-    pairs = [[(leaf, differentiate(a, leaf)) for leaf in leaves_of(a)] for a in accelerations]
-    assert all(slope.degree == 0 for row in pairs for _, slope in row)
-    return tuple(tuple((leaf, slope) for leaf, slope in row if slope is not number(0.0)) for row in pairs)

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.taylor.vectors import CACHE_LINE, LONG, Coefficient, Vec, add, loop, multiply, subtract
+from saltus.taylor.vectors import CACHE_LINE, LONG, Coefficient, ColumnInputs, Vec, add, loop, multiply, subtract
 
 if TYPE_CHECKING:
     from saltus.taylor.series import Series
@@ -129,84 +129,33 @@ class Row:
     place: Any = None  # LLVM's pointer to coefficient 0, where the series lies in memory
 
 
-class InnerLoop:
-    """A loop over j = 1 .. k - 1 that makes the sums of some products for the orders k and k + 1."""
-
-    def __init__(self, series: Series) -> None:
-        self.series, self.builder = series, series.builder
-        self.block = self.builder.append_basic_block("sums")
-        self._changing: list[tuple[Any, Any, Any]] = []  # LLVM's variable, its value at first, its next value
-        self._loaded: dict[tuple[int, bool], Vec] = {}
-        self._carried: dict[int, Vec] = {}
-        self._made = 0
-        self._j = self._variable(LONG)
-
-    @property
-    def full(self) -> bool:
-        """Whether the loop has as many sums as it should."""
-        return self._made == SETTINGS.most_sums
-
-    def sums(self, forward: Row, backward: Row) -> tuple[Vec, Vec]:
-        """sum a_j b_{k-j} and sum a_j b_{k+1-j} of a `forward`, b `backward`; a_1 b_k only if b_k is known before the loop."""
-        self._made += 1
-        with self.builder.goto_block(self.block):
-            a, b = self._load(forward, False), self._load(backward, True)
-            return self._sum(a, b), self._sum(a, self._before(backward, b))
-
-    def _variable(self, kind: Any) -> Any:
-        with self.builder.goto_block(self.block):
-            self.builder.position_at_start(self.block)
-            return self.builder.phi(kind)
-
-    def _load(self, row: Row, backwards: bool) -> Vec:
-        """Coefficient j, or k - j, of a series."""
-        key = (id(row), backwards)
-        if key not in self._loaded:
-            index = self.builder.sub(self.series.order, self._j) if backwards else self._j
-            self._loaded[key] = self.series._at(row, index)
-        return self._loaded[key]
-
-    def _before(self, row: Row, loaded: Vec) -> Vec:
-        """Coefficient k + 1 - j, which the iteration before has loaded."""
-        if id(row) not in self._carried:
-            variable = self._variable(self.series._kind)
-            start = self.series.memory.value(row.pair[0] if row.early else None)
-            self._changing.append((variable, start, loaded.value))
-            self._carried[id(row)] = Vec(self.builder, variable, self.series.memory.arithmetic)
-        return self._carried[id(row)]
-
-    def _sum(self, a: Vec, b: Vec) -> Vec:
-        variable = self._variable(self.series._kind)
-        total = a.fma(b, Vec(self.builder, variable, self.series.memory.arithmetic))
-        self._changing.append((variable, a.as_value(0.0), total.value))
-        return total
-
-    def close(self, before: Any, after: Any) -> None:
-        """Join the loop to the code before and after it."""
-        with self.builder.goto_block(self.block):
-            following = self.builder.add(self._j, LONG(1))
-            self.builder.cbranch(self.builder.icmp_signed("<", following, self.series.order), self.block, after)
-        for variable, start, value in [(self._j, LONG(1), following), *self._changing]:
-            variable.add_incoming(start, before)
-            variable.add_incoming(value, self.block)
-
-
-class ModeLoops:
-    """Writes the loops over modes at each order of a series."""
+class Loops:
+    """Writes the loops over modes, and over the columns of a tangent, at each order of a series."""
 
     def __init__(self, series: Any, rows: Any, inputs: list[Any]) -> None:
-        self.series, self.rows, self.block, self.b = series, rows, rows.block, series.builder
-        self._inputs = dict(zip(self.block.expressions, inputs, strict=True))  # their rows
+        self.series, self.rows, self.block, self.b = series, rows, rows.modes, series.builder
+        self._inputs = dict(zip(rows.expressions, inputs, strict=True))  # their rows
         memory = series.memory
         self._rows = [memory.pointer(place) for place in (rows.positions, rows.velocities, rows.accelerations)]
         array = memory.arguments[rows.positions[0]]
         self._stride = LONG(series.layout.capacity) if len(array.shape) == 1 else array.shape[1]
-        self._data = memory.pointer(memory.leaves["datum"])
-        self._count = memory.whole(self._data)
-        self._dof = self.b.add(LONG(self.block.first), self._count)
+        self._dof, self._forms = LONG(rows.dof), list[Any]()
+        if self.block is not None:
+            self._forms = list(self.block.forms)
+            self._data = memory.pointer(memory.leaves["datum"])
+            self._count = memory.whole(self._data)
+            self._dof = self.b.add(LONG(self.block.first), self._count)
+        self._sums = self._array(len(self._forms) * (1 + rows.columns))
+        self._pushes = ColumnInputs(memory, rows.columns, [each.pushes for each in rows.sums])
+        if rows.sums:
+            self._offsets = [self.b.mul(LONG(i), self._stride) for i in range(len(rows.sums))]
+
+    def _array(self, size: int) -> Any:
+        """LLVM's pointer to memory for so many numbers."""
         with self.b.goto_entry_block():
-            self._sums = self.b.alloca(self._one.value.type, max(1, len(self.block.forms) * (1 + rows.columns)))
-        self._sums.align = min(CACHE_LINE, 8 * memory.arithmetic.width)
+            array = self.b.alloca(self._one.value.type, max(1, size))
+        array.align = min(CACHE_LINE, 8 * self.series.memory.arithmetic.width)
+        return array
 
     def begin(self) -> None:
         """Put the state at the start into the series, where it is given elsewhere."""
@@ -214,20 +163,21 @@ class ModeLoops:
         for which, kind in enumerate(("coordinate", "velocity")):
             if kind in leaves:
                 given = self.series.memory.pointer(leaves[kind])
-                for begin, end, first in ((0, 1, self.block.first), (1, 1 + self.rows.columns, 0)):
+                local = self._dof if self.block is None else LONG(self.block.first)
+                for begin, end, first in ((0, int(self.block is not None), local), (1, 1 + self.rows.columns, LONG(0))):
                     if begin < end:
                         self._copy_columns(begin, end, first, which, given)
 
-    def _copy_columns(self, begin: int, end: int, first: int, which: int, given: Any) -> None:
+    def _copy_columns(self, begin: int, end: int, first: Any, which: int, given: Any) -> None:
         with loop(self.b, begin, end) as j:
-            base = self.b.mul(j, self._dof)
-            with loop(self.b, first, self._dof) as i:
+            base = self.b.add(self.b.mul(j, self._dof), first)
+            with loop(self.b, 0, self.b.sub(self._dof, first)) as i:
                 row = self.b.add(base, i)
                 self._store(self._place(which, row, LONG(0)), self._load(self.b.gep(given, [row])))
 
     def sums(self) -> None:
         """Compute all sums over modes at order 0; those of the next orders come with the modes' coefficients (`_columns`)."""
-        forms, b = self.block.forms, self.b
+        forms, b = self._forms, self.b
         if not forms or not self.series.starts:
             return
         with loop(self.b, 0, 1 + self.rows.columns) as j:
@@ -237,30 +187,104 @@ class ModeLoops:
                 self._store(self._sum_of(j, f), self._total(parts))
 
     def value(self, form: Any) -> Vec:
-        """One of these sums."""
-        column, own = (form.first - self.block.first) // self.block.dof, form._replace(first=self.block.first)
-        return self._load(self.b.gep(self._sums, [LONG(column * len(self.block.forms) + self.block.forms.index(own))]))
+        """One of these sums, of the motion."""
+        return self._load(self._sum_of(LONG(0), self._forms.index(form)))
 
     @property
     def _parts(self) -> list[tuple[int, int, int]]:
         """The parts of the sums: the number of the sum, of amplitudes (0) or rates (1), and the place of the coefficient."""
-        given = [(f, which, form[which]) for f, form in enumerate(self.block.forms) for which in (0, 1)]
+        given = [(f, which, form[which]) for f, form in enumerate(self._forms) for which in (0, 1)]
         return [(f, which, place) for f, which, place in given if place is not None]
 
     def _sum_of(self, column: Any, f: int) -> Any:
         """LLVM's pointer to a sum of a column."""
-        return self.b.gep(self._sums, [self.b.add(self.b.mul(column, LONG(len(self.block.forms))), LONG(f))])
+        return self.b.gep(self._sums, [self.b.add(self.b.mul(column, LONG(len(self._forms))), LONG(f))])
 
     def advance(self) -> None:
-        """Compute the accelerations of all modes at this order, and integrate them."""
+        """Compute the accelerations of columns and modes at this order, and integrate them."""
+        if self.rows.sums:
+            self._advance_columns()
+        if self.block is None:
+            return
         self._columns(0, 1, [each for each in self.block.inputs if not each.local])
         begin, extra = 1, self.block.columns
         for column in range(1, 1 + self.rows.columns):
-            if extra and (extra[column - 1] or any(self._pushed(column))):
+            if extra and extra[column - 1]:
                 self._columns(begin, column, [])
                 self._columns(column, column + 1, list(extra[column - 1]))
                 begin = column + 1
         self._columns(begin, 1 + self.rows.columns, [])
+
+    def _advance_columns(self) -> None:
+        """The local equations of all columns, some of them side by side."""
+        b, count = self.b, self.rows.columns
+        abreast = min(4, count)  # so many do not wait for their sums, and four columns are what two coordinates have
+        self._pushes.store(lambda push: self.series.now(self._inputs[push]))
+        with loop(b, 0, -(-count // abreast)) as group:
+            places = [b.add(b.mul(group, LONG(abreast)), LONG(1 + u)) for u in range(abreast)]
+            places = [b.select(b.icmp_signed("<", place, LONG(count)), place, LONG(count)) for place in places]
+            bases = [[b.gep(row, [b.mul(b.mul(place, self._dof), self._stride)]) for row in self._rows] for place in places]
+            found = [self._column_sums(i, each, places, bases) for i, each in enumerate(self.rows.sums)]
+            for i, totals in enumerate(found):
+                for base, total in zip(bases, totals, strict=True):
+                    self._integrate_column(i, base, total)
+
+    def _column_sums(self, i: int, each: Any, places: list[Any], bases: list[Any]) -> list[Vec]:
+        """A coordinate's acceleration, or velocity, in some columns at this order: sum_l sum_j s_lj x_l,k-j."""
+        b, series = self.b, self.series
+        totals = [self._pushes.of(i, b.sub(place, LONG(1))) for place in places]
+        looped = list[Any]()
+        for leaf, slope in each.terms:
+            row = self._inputs[slope]
+            for index, coefficient in self._newest(row):
+                for u, (place, base) in enumerate(zip(places, bases, strict=True)):
+                    totals[u] = self._lifted(coefficient).fma(self._of_column(leaf, place, base, index), totals[u])
+            looped += [(leaf, row)] if series.ahead is not None and row.degree is None else []
+        if not looped:
+            return totals
+        after = list[Vec]()
+        with loop(b, 0, series.order, totals, after) as (j, sums):
+            index = b.sub(self._order, j)
+            there = [[b.gep(row, [index]) for row in base] for base in bases]
+            for leaf, row in looped:
+                factor, which, offset = series._at(row, j), int(leaf.op == "velocity"), self._offsets[leaf.value]
+                states = [self._load(b.gep(at[which], [offset])) for at in there]
+                sums = [factor.fma(state, total) for state, total in zip(states, sums, strict=True)]
+            after += sums
+        return after
+
+    def _newest(self, row: Any) -> list[tuple[Any, Any]]:
+        """The coefficients of a slope that need no memory, each with the order of what it is multiplied by."""
+        order, ahead = self.series.order, self.series.ahead
+        if ahead is None:
+            pairs = [(LONG(order - j), row.first[j]) for j in range(order + 1)]
+        elif row.degree is None:
+            pairs = [(LONG(ahead - j), row.pair[j]) for j in range(ahead + 1)]
+        else:
+            pairs = [(self.b.add(order, LONG(ahead - j)), row.first[j]) for j in range(row.degree + 1)]
+        return [(index, coefficient) for index, coefficient in pairs if coefficient is not None]
+
+    def _of_column(self, leaf: Any, place: Any, base: Any, index: Any) -> Vec:
+        """A coefficient of what a column has in a leaf's place; of sums over modes there is that of this order alone."""
+        if leaf.op == "form":
+            return self._load(self._sum_of(place, self._forms.index(leaf.value)))
+        return self._load(self.b.gep(base[leaf.op == "velocity"], [self.b.add(self._offsets[leaf.value], index)]))
+
+    def _integrate_column(self, i: int, base: Any, total: Vec) -> None:
+        """Put a coordinate's acceleration in a column, or of first order its velocity, into the series."""
+        b, order, series, offset = self.b, self._order, self.series, self._offsets[i]
+        now, following = b.add(offset, order), b.add(offset, b.add(order, LONG(1)))
+        pull, zero = total, self.series.memory.arithmetic.number(b, 0.0)
+        if i in self.rows.first_order:
+            self._store(b.gep(base[1], [now]), total)
+            pull = zero
+            if self.rows.with_accelerations and not series.starts:
+                number = self._lifted(float(series.order) if series.ahead is None else series._number + float(series.ahead))
+                self._store(b.gep(base[2], [b.sub(now, LONG(1))]), number * total)
+        if self.rows.with_accelerations:
+            self._store(b.gep(base[2], [now]), pull)
+        self._store(b.gep(base[0], [following]), series._divided(self._load(b.gep(base[1], [now])), 1))
+        self._store(b.gep(base[1], [following]), series._divided(pull, 1))
 
     def _columns(self, begin: int, end: int, more: list[Any]) -> None:
         """The modes of some columns, with inputs that are expressions, and the sums over their coefficients of the next order."""
@@ -281,8 +305,6 @@ class ModeLoops:
                 if each.local
             ]
             first = b.add(base, LONG(block.first))
-            if begin > 0:
-                self._advance_local(j, base, self._pushed(begin), begin < self.rows.kept)
             after = list[Vec]()
             with self._over_modes(len(self._parts), after) as (i, before):
                 row = b.add(first, i)
@@ -296,7 +318,7 @@ class ModeLoops:
                 for each, value in (*given, *local):
                     factor = self._datum(i, each.place)
                     total = factor.fma(value if each.sign > 0.0 else -value, total)
-                if begin < self.rows.kept:
+                if begin == 0 or self.rows.with_accelerations:
                     self._store(self._place(2, row, self._order), total)
                 following, new = b.add(self._order, LONG(1)), (rate * inverse, total * inverse)
                 for which in (1, 0):
@@ -308,31 +330,6 @@ class ModeLoops:
                 sums[f] = sums[f] + value if f in sums else value
             for f, value in sums.items():
                 self._store(self._sum_of(j, f), value)
-
-    def _pushed(self, column: int) -> list[Vec | None]:
-        """The terms of a column's own in its local equations, at this order."""
-        values = [self.series.now(self._inputs[push]) for push in self.block.pushes[column - 1]]
-        return [None if value is None else self._lifted(value) for value in values]
-
-    def _advance_local(self, column: Any, base: Any, pushed: list[Vec | None], kept: bool) -> None:
-        """The local coordinates of a column."""
-        b, found, inverse = self.b, list[Vec](), self.series._divided(self._one, 1)
-        for i, row in enumerate(self.block.slopes):
-            total: Any = pushed[i] if pushed and pushed[i] is not None else self.series.memory.arithmetic.number(b, 0.0)
-            for leaf, slope in row:
-                if leaf.op == "form":
-                    value = self._load(self._sum_of(column, self.block.forms.index(leaf.value)))
-                else:
-                    value = self._load(self._place(int(leaf.op == "velocity"), b.add(base, LONG(leaf.value)), self._order))
-                total = self._lifted(self._inputs[slope].first[0]).fma(value, total)
-            found.append(total)
-        following = b.add(self._order, LONG(1))
-        for i, total in enumerate(found):
-            place = b.add(base, LONG(i))
-            if kept:
-                self._store(self._place(2, place, self._order), total)
-            self._store(self._place(0, place, following), self._load(self._place(1, place, self._order)) * inverse)
-            self._store(self._place(1, place, following), total * inverse)
 
     @property
     def _order(self) -> Any:
@@ -387,11 +384,11 @@ def needs_sums(op: str, degrees: list[int | None]) -> bool:
     return op == "sqrt" or (op not in ("add", "sub") and degrees[-1 if op == "div" else 0] is None)
 
 
-def mode_loops(series: Series, roots: list[int]) -> ModeLoops | None:
-    """The loops over modes, if there are any: the last of the roots that are kept are their inputs."""
-    rows, last = series.layout.modes, len(series.layout.roots)
+def loops_of(series: Series, roots: list[int]) -> Loops | None:
+    """The loops over modes and columns, if there are any: the last of the roots that are kept are what they read."""
+    rows, last = series.layout.loops, len(series.layout.roots)
     if rows is None:
         return None
-    loops = ModeLoops(series, rows, [series.rows[root] for root in roots[last - len(rows.block.expressions) : last]])
+    loops = Loops(series, rows, [series.rows[root] for root in roots[last - len(rows.expressions) : last]])
     loops.begin()
     return loops

@@ -5,8 +5,8 @@ a product of two series takes for both orders a sum over coefficients that lie i
 
     sum_{j=1}^{k-1} a_j b_{k-j}    and    sum_{j=1}^{k-1} a_j b_{k+1-j}.
 
-An inner loop computes both (see `rules.py`). The terms with the newest coefficients are added after it. A series that ends, such
-as that of the time, needs no loop: its few terms are written out.
+An inner loop computes both (`InnerLoop`). The terms with the newest coefficients are added after it. A series that ends, such as
+that of the time, needs no loop: its few terms are written out.
 """
 
 from __future__ import annotations
@@ -17,18 +17,22 @@ from dataclasses import dataclass
 from typing import Any
 
 from saltus.taylor.graph import LEAVES, RECORD_WIDTH, degree
-from saltus.taylor.memory import Memory, ModeRows, Node, Place, Tape
-from saltus.taylor.rules import (
-    ARITHMETIC,
-    FUNCTIONS,
-    SETTINGS,
+from saltus.taylor.memory import LoopRows, Memory, Node, Place, Tape
+from saltus.taylor.rules import ARITHMETIC, FUNCTIONS, SETTINGS, Row, by_slope, loops_of, needs_sums
+from saltus.taylor.vectors import (
+    CACHE_LINE,
+    DOUBLE,
+    LONG,
+    Coefficient,
     InnerLoop,
-    Row,
-    by_slope,
-    mode_loops,
-    needs_sums,
+    Vec,
+    add,
+    dot,
+    inverses,
+    multiply,
+    quotient,
+    subtract,
 )
-from saltus.taylor.vectors import CACHE_LINE, DOUBLE, LONG, Coefficient, Vec, add, dot, inverses, multiply, quotient, subtract
 
 
 @dataclass(frozen=True)
@@ -49,7 +53,7 @@ class Rows:
     numbers: Sequence[Place] = ()  # where further roots that do not change are stored
     first_order: Sequence[int] = ()  # the positions of first order
     coordinates: Sequence[int] | None = None  # those whose positions these are, if they are not all
-    modes: ModeRows | None = None  # the others, whose inputs are the last of the roots
+    loops: LoopRows | None = None  # the others, whose equations read the last of the roots
 
 
 class Series:
@@ -62,7 +66,7 @@ class Series:
         own = layout.coordinates or range(len(layout.positions))
         self.positions = {i: Row(None, True, place=memory.pointer(at)) for i, at in zip(own, layout.positions, strict=True)}
         self.velocities = {i: Row(None, True, place=memory.pointer(at)) for i, at in zip(own, layout.velocities, strict=True)}
-        self.modes: Any = None
+        self.loops: Any = None
         self._nodes: dict[int, Node] = {}  # the node of each row, by the row's id
         self._scaled: dict[int, Row] = {}
         self._records: dict[int, Any] = {}
@@ -117,10 +121,10 @@ class Series:
         ]
         slopes: list[Any] = [(*(place and self.memory.pointer(place) for place in places), row) for *places, row in self._slopes]
         numbers = zip(self.layout.numbers, roots[len(self.layout.roots) :], strict=True)
-        self.modes = mode_loops(self, roots)
+        self.loops = loops_of(self, roots)
         for _ in self._each_order():
-            if self.modes is not None:
-                self.modes.sums()
+            if self.loops is not None:
+                self.loops.sums()
             self._advance()
             if self.starts:
                 for place, root in numbers:
@@ -134,8 +138,8 @@ class Series:
                 self._write_slope(rate, acceleration, self.now(slope))
             for pointer, row in kept:
                 self._write(pointer, self.now(row))
-            if self.modes is not None:
-                self.modes.advance()
+            if self.loops is not None:
+                self.loops.advance()
 
     # --- the orders ------------------------------------------------------------------------------------------------------------
 
@@ -190,7 +194,7 @@ class Series:
             if ended or op in ("coordinate", "velocity"):
                 continue
             if op in (*LEAVES, "constant"):
-                self.push(row, self.modes.value(node[1]) if op == "form" else self._leaf(node))
+                self.push(row, self.loops.value(node[1]) if op == "form" else self._leaf(node))
                 continue
             with self._before_sums(row):
                 self._apply(op, row, node[1:])
@@ -365,7 +369,7 @@ class Series:
         """The sums of a product for both orders of a pair, made in an inner loop."""
         key = (id(forward), id(backward))
         if key not in self._sums:
-            if not self._loops or self._loops[-1].full:
+            if not self._loops or self._loops[-1].made == SETTINGS.most_sums:
                 self._loops.append(InnerLoop(self))
             self._sums[key] = self._loops[-1].sums(forward, backward)
         return self._sums[key]

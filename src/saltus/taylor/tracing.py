@@ -35,7 +35,7 @@ from saltus.taylor.graph import (
     uses_velocity,
 )
 from saltus.taylor.load_tables import LoadTime
-from saltus.taylor.memory import ModeBlock, ModeInput, ModeRows, leaves_of, local_parts, local_slopes, mode_block, without_modes
+from saltus.taylor.memory import ColumnSum, LoopRows, ModeBlock, ModeInput, leaves_of, local_parts, mode_block, without_modes
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -97,6 +97,7 @@ class Trace:
     friction_contacts: tuple[int, ...] = ()  # then the contact whose reaction presses each of them, -1 for none
     friction_coordinates: tuple[int, ...] = ()  # the coordinate of each friction, then -1 less that of each surface
     modes: ModeBlock | None = None  # of a structure; their accelerations are leaves "mode"
+    sums: tuple[ColumnSum, ...] = ()  # the accelerations of all columns, which are then leaves "mode" too
 
     @property
     def first_order_rows(self) -> tuple[int, ...]:
@@ -123,17 +124,21 @@ class Trace:
         """The coordinates, with those of the tangent's columns, whose accelerations are expressions of their own."""
         return [i for i, a in enumerate(self.acceleration) if a.op != "mode"]
 
-    def mode_rows(self, places: Sequence[tuple[str, int]], kept: int) -> ModeRows | None:
-        """Where the series of modes lie: the places of those of the first coordinate, and how many columns keep accelerations."""
-        if self.modes is None:
-            return None
-        positions, velocities, accelerations = places
-        return ModeRows(self.modes, positions, velocities, accelerations, self.columns, kept)
+    def loop_rows(self, places: Sequence[Any], with_accelerations: bool) -> LoopRows | None:
+        """The equations in loops over modes and columns, or None, with the places of the first coordinate's series."""
+        first_order = tuple(i for i in self.first_order_rows if i < self.dof)
+        at, counts = (places[0], places[1], places[2]), (self.dof, self.columns)
+        return LoopRows(*at, *counts, with_accelerations, self.modes, self.sums, first_order) if self.modes or self.sums else None
 
     @property
-    def inputs_of_modes(self) -> list[Expr]:
-        """The inputs of modes that are expressions."""
-        return [] if self.modes is None else self.modes.expressions
+    def inputs_of_loops(self) -> list[Expr]:
+        """The expressions that these loops read, which need no places."""
+        return [] if (rows := self.loop_rows([("", 0)] * 3, False)) is None else rows.expressions
+
+    @property
+    def in_loops(self) -> bool:
+        """Whether the tangent's equations are written once, in loops over columns; of one coordinate others are 5 % faster."""
+        return self.columns > 0 and (self.dof > 1 or self.modes is not None)
 
     def symbol(self, path: str, value: float) -> Expr:
         """The symbol of the number at a dotted path."""
@@ -147,17 +152,13 @@ class Trace:
         for path, order in list(self.records):  # the time derivative at a jump of the motion needs these
             if (path, order + 1) not in self.records:
                 self.records.append((path, order + 1))
-        for j in range(self.columns):
-            places = range(self.dof * (1 + j), self.dof * (2 + j))
-            written = [] if self.modes is not None else [self.derivative_along(a, j) for a in own]
-            self.acceleration += written or [Expr("mode", (), place) for place in places]
+        if self.in_loops:
+            self.sums = tuple(map(self.column_sum, own[: self.local]))
+            self.acceleration += [Expr("mode", (), place) for place in range(self.dof, self.dof * (1 + self.columns))]
+        else:
+            self.acceleration += [self.derivative_along(own[0], j) for j in range(self.columns)]
         if self.modes is not None:
-            local, empty = own[: self.local], list[Expr]()
-            columns = tuple(self._inputs_of_modes(j) for j in range(self.columns))
-            pushes = [
-                [self.partial_derivative(a, j) for a in (local if j >= 2 * self.dof else empty)] for j in range(self.columns)
-            ]
-            self.modes = replace(self.modes, columns=columns, slopes=local_slopes(local), pushes=tuple(map(tuple, pushes)))
+            self.modes = replace(self.modes, columns=tuple(self._inputs_of_modes(j) for j in range(self.columns)))
 
     def _inputs_of_modes(self, j: int) -> tuple[ModeInput, ...]:
         """The inputs of the modes of column j that are expressions."""
@@ -176,17 +177,16 @@ class Trace:
         return [Expr("coordinate", (), i) for i in places], [Expr("velocity", (), i) for i in places]
 
     def derivative_along(self, root: Expr, j: int) -> Expr:
-        """The derivative of an expression of the motion along column j, at a fixed time."""
-        if root.op == "number":
-            return number(0.0)
-        total, following = self.partial_derivative(root, j), self.dof * (1 + j)
-        for leaf in leaves_of(root):
-            if leaf.op == "form":
-                along = Expr("form", (), leaf.value._replace(first=leaf.value.first + following))
-            else:
-                along = Expr(leaf.op, (), leaf.value + following)
-            total = total + differentiate(root, leaf) * along
+        """The derivative of an expression of the motion along column j, at a fixed time, written out."""
+        total = self.partial_derivative(root, j)
+        for leaf, slope in self.column_sum(root).terms:
+            total = total + slope * Expr(leaf.op, (), leaf.value + self.dof * (1 + j))
         return total
+
+    def column_sum(self, root: Expr, over: Expr | None = None) -> ColumnSum:
+        """The derivative of an expression of the motion along each column, at a fixed time, divided by `over`."""
+        pushes = [self.partial_derivative(root, j) for j in range(2 * self.dof, self.columns)]
+        return ColumnSum.of([(leaf, differentiate(root, leaf)) for leaf in leaves_of(root)], pushes, over)
 
     def partial_derivative(self, root: Expr, j: int) -> Expr:
         """The partial derivative of an expression to column j's parameter, at a fixed time and state; 0 for the other columns."""

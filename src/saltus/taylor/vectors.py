@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -26,7 +26,6 @@ def host_width() -> int:
 
     With AVX-512 a vector takes two registers: while the processor waits for the sums in one, it works on those in the other, so
     that a step takes about 10 % less time for each lane.
-
     The environment variable SALTUS_LANES overrides it, for tests: the results are the same.
     """
     if os.environ.get("SALTUS_LANES") in ("1", "2", "4", "8", "16"):
@@ -47,9 +46,7 @@ class Arithmetic:
 
     width: int
     fused: bool = True
-    exact: bool = (
-        False  # quotients are rounded once, and the C library's sine and cosine called; lanes use reciprocals, polynomials
-    )
+    exact: bool = False  # quotients are rounded once, the C library has sine and cosine; lanes use reciprocals, polynomials
 
     def of(self, element: Any) -> Any:
         """LLVM's type of a number, a truth or an integer for each lane."""
@@ -299,6 +296,99 @@ def inverses(builder: Any, count: int) -> list[Any]:
     whole = range(1, count)
     parts = [1.0 / k for k in whole], [float(Fraction(1, k) - Fraction(1.0 / k)) for k in whole]
     return [constant_table(builder, [1.0, *part]) for part in parts]
+
+
+class InnerLoop:
+    """A loop over j = 1 .. k - 1 that makes the sums of some products of series for the orders k and k + 1 (see `series.py`)."""
+
+    def __init__(self, series: Any) -> None:
+        self.series, self.builder = series, series.builder
+        self.block = self.builder.append_basic_block("sums")
+        self._changing: list[tuple[Any, Any, Any]] = []  # LLVM's variable, its value at first, its next value
+        self._loaded: dict[tuple[int, bool], Vec] = {}
+        self._carried: dict[int, Vec] = {}
+        self.made = 0  # sums
+        self._j = self._variable(LONG)
+
+    def sums(self, forward: Any, backward: Any) -> tuple[Vec, Vec]:
+        """sum a_j b_{k-j} and sum a_j b_{k+1-j} of a `forward`, b `backward`; a_1 b_k only if b_k is known before the loop."""
+        self.made += 1
+        with self.builder.goto_block(self.block):
+            a, b = self._load(forward, False), self._load(backward, True)
+            return self._sum(a, b), self._sum(a, self._before(backward, b))
+
+    def _variable(self, kind: Any) -> Any:
+        with self.builder.goto_block(self.block):
+            self.builder.position_at_start(self.block)
+            return self.builder.phi(kind)
+
+    def _load(self, row: Any, backwards: bool) -> Vec:
+        """Coefficient j, or k - j, of a series."""
+        key = (id(row), backwards)
+        if key not in self._loaded:
+            index = self.builder.sub(self.series.order, self._j) if backwards else self._j
+            self._loaded[key] = self.series._at(row, index)
+        return self._loaded[key]
+
+    def _before(self, row: Any, loaded: Vec) -> Vec:
+        """Coefficient k + 1 - j, which the iteration before has loaded."""
+        if id(row) not in self._carried:
+            variable = self._variable(self.series._kind)
+            start = self.series.memory.value(row.pair[0] if row.early else None)
+            self._changing.append((variable, start, loaded.value))
+            self._carried[id(row)] = Vec(self.builder, variable, self.series.memory.arithmetic)
+        return self._carried[id(row)]
+
+    def _sum(self, a: Vec, b: Vec) -> Vec:
+        variable = self._variable(self.series._kind)
+        total = a.fma(b, Vec(self.builder, variable, self.series.memory.arithmetic))
+        self._changing.append((variable, a.as_value(0.0), total.value))
+        return total
+
+    def close(self, before: Any, after: Any) -> None:
+        """Join the loop to the code before and after it."""
+        with self.builder.goto_block(self.block):
+            following = self.builder.add(self._j, LONG(1))
+            self.builder.cbranch(self.builder.icmp_signed("<", following, self.series.order), self.block, after)
+        for variable, start, value in [(self._j, LONG(1), following), *self._changing]:
+            variable.add_incoming(start, before)
+            variable.add_incoming(value, self.block)
+
+
+class ColumnInputs:
+    """What is pushed in the columns of parameters, in memory: zeros for the other columns, then numbers for each of these."""
+
+    def __init__(self, memory: Any, columns: int, pushes: Sequence[Sequence[Any]]) -> None:
+        """`pushes` are, of each number that a column has, those in the last of all columns, None for 0."""
+        self._builder, self._arithmetic = memory.builder, memory.arithmetic
+        self._pushes = {i: each for i, each in enumerate(pushes) if any(push is not None for push in each)}
+        self._first = columns - max(map(len, self._pushes.values()), default=0)
+        size = max(1, len(self._pushes) * (1 + columns - self._first))
+        with self._builder.goto_entry_block():
+            self._array = self._builder.alloca(self._arithmetic.of(DOUBLE), size)
+            self._array.align = min(CACHE_LINE, 8 * self._arithmetic.width)
+            for place in range(len(self._pushes)):
+                self._put(place, None)
+
+    def store(self, value: Callable[[Any], Coefficient]) -> None:
+        """Put the present values into memory."""
+        pushes = (push for column in zip(*self._pushes.values(), strict=True) for push in column)
+        for place, push in enumerate(pushes, len(self._pushes)):
+            self._put(place, None if push is None else value(push))
+
+    def of(self, i: int, column: Any) -> Vec:
+        """What is pushed in LLVM's column, as counted from 0, of one of its numbers."""
+        b = self._builder
+        if i not in self._pushes:
+            return Vec(b, self._arithmetic.constant(0.0), self._arithmetic)
+        own = b.sub(column, LONG(self._first - 1))
+        own = b.select(b.icmp_signed("<", own, LONG(0)), LONG(0), own)
+        place = b.add(b.mul(own, LONG(len(self._pushes))), LONG(list(self._pushes).index(i)))
+        return Vec(b, b.load(b.gep(self._array, [place])), self._arithmetic)
+
+    def _put(self, place: int, value: Coefficient) -> None:
+        number = value.value if isinstance(value, Vec) else self._arithmetic.constant(value or 0.0)
+        self._builder.store(number, self._builder.gep(self._array, [LONG(place)]))
 
 
 def constant_table(builder: Any, numbers: list[float]) -> Any:

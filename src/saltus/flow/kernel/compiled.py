@@ -215,7 +215,7 @@ def _function(name: str, places: Places, content: Sequence[Any]) -> WrittenFunct
     """A function of one motion; its signature has its name in `memory.py`. It has no places of what it does not read in
     a state."""
     if not isinstance(content, SeriesOf):
-        read = {node[0] for case in content for node in case.tape.nodes}
+        read = {op for case in content for op in case.leaves}
         leaves = {op: place for op, place in places.leaves.items() if op in read or place[0] != "state"}
         places = replace(places, leaves=leaves)
     return WrittenFunction(name, getattr(memory, name.upper()), places, SCALAR, content)
@@ -223,11 +223,12 @@ def _function(name: str, places: Places, content: Sequence[Any]) -> WrittenFunct
 
 def constants(trace: Trace) -> dict[Expr, int]:
     """The table of constants: the parts of a structure's expressions that depend on parameters alone, with their places."""
-    roots = [*trace.acceleration, *motion_roots(trace), *_geometry(trace), *trace.contact_numbers, *trace.inputs_of_modes]
+    roots = [*trace.acceleration, *motion_roots(trace), *_geometry(trace), *trace.contact_numbers, *trace.inputs_of_loops]
     rest = (trace.contact_acceleration, trace.next_side, trace.velocity_after, trace.contact_damping)
     roots += [x for x in rest if x is not None]
-    roots += [x for *_, new in (event_derivatives.changes(trace) if trace.columns else []) for x in new.values()]
-    roots += event_derivatives.number_slopes(trace)
+    roots += [x for *_, new in event_derivatives.changes(trace) for x in new.values()]
+    sums = [*event_derivatives.number_slopes(trace).values(), *(each for *_, each in event_derivatives.shifts(trace))]
+    roots += [x for each in sums for x in each.expressions]
     return shared_constants(roots + (equations.roots if (equations := one_free(trace)) else []))
 
 
@@ -259,15 +260,14 @@ def _geometry(trace: Trace) -> list[Expr]:
 
 def _series(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
     """The Taylor coefficients of the coordinates, velocities, accelerations, the gap and the margins from one state."""
-    rows, inputs, gap = trace.local_rows, trace.inputs_of_modes, [("g", 0)] if trace.gap is not None else []
+    rows, inputs, gap = trace.local_rows, trace.inputs_of_loops, [("g", 0)] if trace.gap is not None else []
     margins = [("m", j) for j in range(len(trace.reactions) + len(trace.margins))]
     targets = [*(("a", i) for i in rows), *gap, *margins, *[None] * len(inputs)]
     leaves = LEAVES | _free(trace) | _data(known)
     places = Places(("t", "origin", "side", "env", "piece", "q", "v", "a", "g", "m", "w", "order"), leaves)
-    modes, first_order = trace.mode_rows((("q", 0), ("v", 0), ("a", 0)), 1 + trace.columns), trace.first_order_rows
-    positions, velocities = ([(name, i) for i in rows] for name in ("q", "v"))
-    most = MOST_COEFFICIENTS
-    layout = Rows(positions, velocities, targets, most, True, first_order=first_order, coordinates=rows, modes=modes)
+    loops = trace.loop_rows((("q", 0), ("v", 0), ("a", 0)), with_accelerations=True)
+    (q, v), first_order = ([(name, i) for i in rows] for name in ("q", "v")), [i for i in trace.first_order_rows if i in rows]
+    layout = Rows(q, v, targets, MOST_COEFFICIENTS, True, first_order=first_order, coordinates=rows, loops=loops)
     roots = [*(trace.acceleration[i] for i in rows), *motion_roots(trace), *inputs]
     return _function("series", places, SeriesOf(layout, tape(roots, known, series=True)))
 
@@ -291,8 +291,8 @@ def _in_time(name: str, roots: dict[int, Expr], known: dict[Expr, int]) -> Writt
 
 
 def _matrices(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
-    """The numbers that events at contacts need (`Trace.contact_numbers`) at a state; with modes all but zeros."""
-    filled = {("out", i): root for i, root in enumerate(trace.contact_numbers) if not (trace.modes and root is number(0.0))}
+    """The numbers that events at contacts need (`Trace.contact_numbers`) at a state; zeros are there from the beginning."""
+    filled = {("out", i): root for i, root in enumerate(trace.contact_numbers) if root is not number(0.0)}
     places = Places(("env", "piece", "state", "out"), ENV | HERE | event_derivatives.places_at_event(trace))
     return _function("matrices", places, [Case(tape(list(filled.values()), known), list(filled))])
 
@@ -300,8 +300,8 @@ def _matrices(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
 def _matrix_slopes(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
     """The derivatives, along each column of the tangent, of the numbers that `matrices` fills; one column after the other."""
     slopes, leaves = event_derivatives.number_slopes(trace), ENV | HERE | event_derivatives.places_at_event(trace)
-    filled = {("out", i): root for i, root in enumerate(slopes) if not (trace.modes and root is number(0.0))}
-    cases = [Case(tape(list(filled.values()), known), list(filled))] if filled else []
+    filled = {(("out", i), len(trace.contact_numbers)): along for i, along in slopes.items()}
+    cases = [Case.of_columns(trace, filled, known)] if filled else []
     return _function("matrix_slopes", Places(("env", "piece", "state", "out"), leaves), cases)
 
 
@@ -315,16 +315,16 @@ def _tangent(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
     """The function that transforms the tangent's columns, in the kernel's state, at each kind of event."""
     count = len(trace.acceleration)
     starts = {"coordinate": 0, "velocity": count, "shift": 2 * count}
-    state = {op: ("state", start) for op, start in starts.items()}
-    cases = []
-    for kind, detail, changes in event_derivatives.changes(trace) if trace.columns else []:
+    state, cases = {op: ("state", start) for op, start in starts.items()}, list[Case]()
+    for *event, changes in event_derivatives.changes(trace):
         targets = [("state", starts[leaf.op] + leaf.value) for leaf in changes]
-        roots, when = list(map(trace.written_out, changes.values())), (("kind", int(kind)), ("detail", int(detail)))
-        cases.append(Case(tape(roots, known), targets, when))
-    places = Places(
-        ("kind", "detail", "t", "origin", "side", "env", "piece", "state"), LEAVES | _free(trace) | _data(known) | state
-    )
-    return _function("tangent", places, cases)
+        when = tuple(zip(("kind", "detail"), map(int, event), strict=True))
+        cases.append(Case(tape(list(changes.values()), known), targets, when))
+    for *event, shift in event_derivatives.shifts(trace):
+        when = tuple(zip(("kind", "detail"), map(int, event), strict=True))
+        cases.append(Case.of_columns(trace, {(state["shift"], 1): shift}, known, when))
+    leaves = LEAVES | _free(trace) | _data(known) | state
+    return _function("tangent", Places(("kind", "detail", "t", "origin", "side", "env", "piece", "state"), leaves), cases)
 
 
 def _table(name: str, places: Places, roots: list[Expr], known: dict[Expr, int]) -> WrittenFunction:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 from weakref import WeakKeyDictionary
 
 from saltus.flow.kernel.layout import EventCode, ReleaseDetail, RestDetail
@@ -37,7 +38,7 @@ class Saltation:
 
 
 def changes(trace: Trace) -> list[tuple[EventCode, int, dict[Expr, Expr]]]:
-    """For every event that the structure can have: its kind, its detail, and the new expressions of the tangent's leaves.
+    """For every event at the contact of a model with one: its kind, its detail, and the new expressions of the tangent's leaves.
 
     The leaf "shift" of a column is the shift of the event.
     """
@@ -51,10 +52,8 @@ _changes: WeakKeyDictionary[Trace, list[tuple[EventCode, int, dict[Expr, Expr]]]
 
 def _derive_changes(trace: Trace) -> list[tuple[EventCode, int, dict[Expr, Expr]]]:
     """`changes`, derived once: several functions of a structure are written from them."""
-    events = [(EventCode.LIMIT, i, _shifts(margin_shift(trace, margin))) for i, margin in enumerate(trace.margins.values())]
-    events += [(EventCode.RELEASE, i, _shifts(reaction_slopes(trace, reaction))) for i, reaction in enumerate(trace.reactions)]
-    if trace.gap is None:
-        return events
+    if trace.gap is None or trace.columns == 0:
+        return []
     jump = saltation(trace)
     after, at_rest, none = _shifts(jump.shift), dict[Expr, Expr](), dict[Expr, Expr]()
     for j in range(trace.columns):
@@ -66,7 +65,6 @@ def _derive_changes(trace: Trace) -> list[tuple[EventCode, int, dict[Expr, Expr]
         none |= {u: held if known else NONE, z: number(0.0) if known else NONE}
     still, unknown = [number(0.0)] * trace.columns, [NONE] * trace.columns
     return [
-        *events,
         (EventCode.IMPACT, 0, after),
         (EventCode.RESET_SLOPES, 0, _reset_slopes(trace)),
         (EventCode.REST, RestDetail.AFTER_IMPACTS, at_rest | _shifts(rest_shift(trace))),
@@ -184,30 +182,34 @@ def places_at_event(trace: Trace) -> dict[str, tuple[str, int]]:
     return instant | {"velocity": ("state", count), "shift": ("state", 2 * count)}
 
 
-def number_slopes(trace: Trace) -> list[Expr]:
-    """The derivatives, along each column, of the numbers that events at contacts need, at an instant that moves with its shift;
-    one column after the other."""
-    drifts = [trace.time_derivative(x) for x in trace.contact_numbers] if trace.columns else []
-    return [
-        trace.derivative_along(x, j) + drift * Expr("shift", (), j)
-        for j in range(trace.columns)
-        for x, drift in zip(trace.contact_numbers, drifts, strict=True)
-    ]
+def number_slopes(trace: Trace) -> dict[int, Any]:
+    """The derivatives (`ColumnSum`) of the numbers that events at contacts need, at an instant that moves with its shift; those
+    of numbers that do not change are left out."""
+    found, shift = dict[int, Any](), Expr("shift", (), 0)
+    for i, root in enumerate(trace.contact_numbers if trace.columns else ()):
+        if root.op != "number":
+            along, drift = trace.column_sum(root), trace.time_derivative(root)
+            found[i] = along if drift is number(0.0) else along._replace(terms=(*along.terms, (shift, drift)))
+    return {i: along for i, along in found.items() if along.expressions}
 
 
-def reaction_slopes(trace: Trace, reaction: Expr) -> list[Expr]:
-    """The derivative of a reaction along each column at a fixed time: -dt times the reaction's rate, where it reaches 0."""
-    accelerations = {Expr("acceleration", (), i): a for i, a in enumerate(trace.acceleration[: trace.dof])}
-    return [trace.derivative_along(substitute(reaction, accelerations), j) for j in range(trace.columns)]
-
-
-def margin_shift(trace: Trace, margin: Expr) -> list[Expr]:
-    """The shift of the instant at which a margin m(q, v, a, t, c) reaches 0: -(m_q u + m_v z + m_c) / (m_t + m_q v + m_v a),
-    where a is substituted by the model's acceleration."""
+def shifts(trace: Trace) -> list[tuple[EventCode, int, Any]]:
+    """For every margin, and every reaction of several contacts, the kind and the detail of the event at which it reaches 0, and
+    the event's shift; for a reaction its derivative at a fixed time, which is -dt times its rate."""
+    if trace.columns == 0:
+        return []
     a = trace.acceleration[: trace.dof]
-    margin = substitute(margin, {Expr("acceleration", (), i): a[i] for i in range(trace.dof)})
+    accelerations = {Expr("acceleration", (), i): each for i, each in enumerate(a)}
+    both = (trace.margins.values(), trace.reactions)
+    margins, reactions = ([trace.written_out(substitute(each, accelerations)) for each in given] for given in both)
+    found = [(EventCode.LIMIT, i, margin_shift(trace, margin)) for i, margin in enumerate(margins)]
+    return [*found, *((EventCode.RELEASE, i, trace.column_sum(reaction)) for i, reaction in enumerate(reactions))]
+
+
+def margin_shift(trace: Trace, margin: Expr) -> Any:
+    """The shift of the instant at which a margin m(q, v, t, c) reaches 0: -(m_q u + m_v z + m_c) / (m_t + m_q v + m_v a)."""
     speed = trace.time_derivative(margin)
-    for i in range(trace.dof):
+    for i, a in enumerate(trace.acceleration[: trace.dof]):
         speed = speed + differentiate(margin, Expr("coordinate", (), i)) * Expr("velocity", (), i)
-        speed = speed + differentiate(margin, Expr("velocity", (), i)) * a[i]
-    return [-trace.derivative_along(margin, j) / speed for j in range(trace.columns)]
+        speed = speed + differentiate(margin, Expr("velocity", (), i)) * a
+    return trace.column_sum(margin, over=trace.written_out(-speed))

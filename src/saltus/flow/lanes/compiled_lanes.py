@@ -217,13 +217,13 @@ def _series(trace: Trace, plan: MemoryPlan, known: dict[Expr, int]) -> WrittenFu
     def row(part: str, number: int) -> Slot:
         return plan.slot(part, number * SERIES_LENGTH)
 
-    own, inputs, stops = trace.local_rows, trace.inputs_of_modes, [row("margins", i) for i in range(plan.stops)]
+    own, inputs, stops = trace.local_rows, trace.inputs_of_loops, [row("margins", i) for i in range(plan.stops)]
     targets = [*(row("accelerations", i) if i < plan.own else None for i in own), *stops, *[None] * len(inputs)]
-    modes = trace.mode_rows([plan.slot(part) for part in ("positions", "velocities", "accelerations")], 1)
+    loops = trace.loop_rows([plan.slot(part) for part in ("positions", "velocities", "accelerations")], False)
     margins = motion_roots(trace)[trace.gap is not None :]
     moving, rates = ([row(part, i) for i in own] for part in ("positions", "velocities"))
-    first_order, length = trace.first_order_rows, SERIES_LENGTH
-    layout = Rows(moving, rates, targets, length, any_order=False, first_order=first_order, coordinates=own, modes=modes)
+    first_order, length = [i for i in trace.first_order_rows if i in own], SERIES_LENGTH
+    layout = Rows(moving, rates, targets, length, any_order=False, first_order=first_order, coordinates=own, loops=loops)
     leaves = _leaves(plan, SLOTS.now, "position", "velocity")
     expanded = [*(trace.acceleration[i] for i in own), *margins, *inputs]
     return _function("lane_series", plan, leaves, SeriesOf(layout, tape(expanded, known, series=True)), "order")
