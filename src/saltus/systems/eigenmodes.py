@@ -39,8 +39,8 @@ def eigenmodes_of(structure: Any, spacing: int) -> np.ndarray:
 @lru_cache(maxsize=8)
 def _table(structure: Any, spacing: int) -> np.ndarray:
     contacts, surfaces = structure.contacts, structure.surfaces
-    # The eigenmodes of all sets are kept. A step takes as long as 4 of the other kind for 12 coordinates, 30 for 100.
-    if len(contacts) + len(surfaces) > 3 or longer_steps(structure) < 2.0 + 0.05 * len(structure.names):
+    # The eigenmodes of all sets are kept. A step takes as long as 3 of the other kind for 12 coordinates, 10 for 40.
+    if len(contacts) + len(surfaces) > 3 or longer_steps(structure) < 1.0 + len(structure.names) / 6.0:
         return np.zeros(0)
     blocks = [np.array([len(structure.channels), spacing, *(1.0 / np.arange(1, spacing + 1))])]
     for bits in range(1 << len(contacts) + len(surfaces)):
@@ -86,6 +86,8 @@ def first_order_form(structure: Any, closed: Sequence[Any], pressed: Sequence[An
     mass, push = np.eye(n), np.zeros((n, 1))
     stiffness, damping = np.array(modes.stiffness), np.zeros((n, n)) if modes.damping is None else np.array(modes.damping)
     mass[:m, :m] = modes.mass
+    if not modes.coupled:  # but for rounding
+        damping[m:, m:] = np.diag(np.diag(damping[m:, m:]))
     for surface in pressed:
         i = local.index(surface.coordinate)
         stiffness[i, i] += surface.stiffness
@@ -137,32 +139,27 @@ def _block(form: Any) -> np.ndarray | None:
 
 
 def decoupled(a: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Eigenvalues, eigenvectors and their inverse; None where two eigenvectors are nearly parallel.
+    """Eigenvalues, eigenvectors and their inverse; None where two of one shape nearly agree, as with critical damping.
 
     Those of slow modes have errors of the rounding of the fastest one. Residuals in extended precision, where the machine has
-    it, give their corrections.
+    it, give their corrections. Modes of different shapes may be as close as they like: what then couples them is rounding.
     """
     values, vectors = np.linalg.eig(a)
-    apart = values[None, :] - values[:, None]
-    np.fill_diagonal(apart, 1.0)
-    if not np.all(np.abs(apart) > 1e-6 * np.maximum(np.abs(values), np.abs(values[:, None]))):
+    exact, shapes, real, half = values.astype(np.clongdouble), vectors.astype(np.clongdouble), values.imag == 0.0, len(a) // 2
+    known = [(np.flatnonzero(row), row[row != 0.0].astype(np.longdouble)) for row in a]
+    if not np.linalg.cond(vectors) < 1.0 / np.finfo(float).eps:
         return None
-    rows, columns = np.nonzero(a)
-    given = a[rows, columns].astype(np.longdouble)[:, None]
-    exact, shapes = values.astype(np.clongdouble), vectors.astype(np.clongdouble)
     for _ in range(2):
-        moved = np.zeros_like(shapes)
-        np.add.at(moved, rows, given * shapes[columns])
+        moved = np.array([row @ shapes[columns] for columns, row in known])
         error = np.linalg.solve(shapes.astype(complex), (moved - shapes * exact).astype(complex))
-        turned = error / apart
-        np.fill_diagonal(turned, 0.0)
+        apart = (exact[None, :] - exact[:, None]).astype(complex)
+        turned = np.divide(error, apart, out=np.zeros_like(error), where=np.abs(error) < 1e-3 * np.abs(apart))
         exact = exact + np.diag(error)
-        shapes = shapes + shapes.astype(complex) @ turned.astype(complex)
-    real = values.imag == 0.0
-    exact[real] = exact[real].real
-    shapes[:, real] = shapes[:, real].real
+        exact[real] = exact[real].real
+        shapes = shapes + shapes.astype(complex) @ turned
+        shapes[:, real] = shapes[:, real].real
     vectors = shapes.astype(complex)
     inverse = np.linalg.inv(vectors)
-    if (np.linalg.norm(vectors, axis=0) * np.linalg.norm(inverse, axis=1)).max(initial=0.0) > 1e6:
-        return None
-    return exact.astype(complex), vectors, inverse
+    parts = ((vectors[part], inverse[:, part]) for part in (slice(half), slice(half, None)))
+    amplified = sum(np.linalg.norm(one, axis=0) * np.linalg.norm(other, axis=1) for one, other in parts)
+    return (exact.astype(complex), vectors, inverse) if np.all(amplified < 1e4) else None

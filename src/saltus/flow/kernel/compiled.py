@@ -101,10 +101,10 @@ class CompiledStructure:
         fill_constants(self.tables[0], parameters, constants)
         if self.several:
             env = (np.append(parameters, behind_parameters(self.frictions, self.sizes.local)), constants, *records)
-            return env, ContactsFunctions(*self.functions, np.array(self.signs, dtype=float), np.array(eigenmodes, dtype=float))
+            return env, ContactsFunctions._make((*self.functions, np.array(self.signs, float), np.array(eigenmodes, float)))
         env = (parameters, constants, *records)
         fill_geometry(self.tables[1], env, geometry)
-        return env, OneContactFunctions(*self.functions[:4], geometry, self.functions[4])
+        return env, OneContactFunctions._make((*self.functions[:4], geometry, self.functions[4]))
 
 
 _FILLERS = """

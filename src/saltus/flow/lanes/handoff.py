@@ -138,8 +138,13 @@ def record_extrema(lane, motion, steps):
     for i in range(motion.recorded_steps):
         for row in range(motion.own):
             series, h = steps.step_series[i, row], steps.step_spans[i, 1]
-            above, below = turning_range(series, motion.order, 0.0, h, lane.polynomial)
-            lane.highest, lane.lowest = max(lane.highest, above), min(lane.lowest, below)
+            moved, power = 0.0, h
+            for k in range(1, motion.order + 1):
+                moved += abs(series[k]) * power
+                power *= h
+            if series[0] + moved > lane.highest or series[0] - moved < lane.lowest:  # else it certainly stays between them
+                above, below = turning_range(series, motion.order, 0.0, h, lane.polynomial)
+                lane.highest, lane.lowest = max(lane.highest, above), min(lane.lowest, below)
     motion.recorded_steps = motion.recorded_events = 0
 
 
