@@ -252,16 +252,19 @@ class Motion(Result):
         seen = edges[:-1, None] + SHARES * np.diff(edges)[:, None]
         position, velocity, _ = self._states(np.append(seen.ravel(), bounds))
         at_bounds, rate = position[:, seen.size :].T, velocity[:, : seen.size].reshape(len(velocity), *seen.shape)
-        place, step, sample = np.nonzero(rate[:, :, :-1] * rate[:, :, 1:] < 0.0)
-        turned = self._turned(place, seen[step, sample], seen[step, sample + 1])
         within = np.searchsorted(bounds, edges[:-1], side="right") - 1
         inner = position[:, : seen.size].reshape(rate.shape).transpose(1, 2, 0)
-        found = []
-        for extremum in (np.minimum, np.maximum):
-            values = extremum(at_bounds[:-1], at_bounds[1:])
+        found = [np.minimum(at_bounds[:-1], at_bounds[1:]), np.maximum(at_bounds[:-1], at_bounds[1:])]
+        for extremum, values in zip((np.minimum, np.maximum), found, strict=True):
             extremum.at(values, within, extremum.reduce(inner, axis=1))
-            extremum.at(values, (within[step], place), turned)
-            found.append(values)
+        place, step, sample = np.nonzero(rate[:, :, :-1] * rate[:, :, 1:] < 0.0)
+        low, high, row, near = seen[step, sample], seen[step, sample + 1], within[step], inner[step, sample, place]
+        fastest = np.abs(rate[place, step, sample]) + np.abs(rate[place, step, sample + 1])
+        reach = (high - low) * fastest  # at least twice as far as it goes from the first of both times
+        last = (near - reach < found[0][row, place]) | (near + reach > found[1][row, place])  # the others are not the outermost
+        turned = self._turned(place[last], low[last], high[last])
+        for extremum, values in zip((np.minimum, np.maximum), found, strict=True):
+            extremum.at(values, (row[last], place[last]), turned)
         return np.stack(found, axis=-1)
 
     def _turned(self, place: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:

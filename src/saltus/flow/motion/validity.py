@@ -35,11 +35,17 @@ class DenseOutput:
     def states(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Coordinates and velocities, each (degrees of freedom, n), and sides (n,); at an impact, those after it."""
         step = np.clip(np.searchsorted(self.start, times, side="right") - 1, 0, None)
-        tau, rows = times - self.start[step], np.ascontiguousarray(self.series[step].transpose(2, 1, 0))  # of one power each
-        value, slope = rows[-1], np.zeros_like(rows[-1])
+        tau, used, series = times - self.start[step], step, self.series
+        if times.size < 4 * len(self.start):  # else all steps are turned round once, in place of one for each time
+            used, series = np.arange(times.size), self.series[step]
+        rows = np.ascontiguousarray(series.transpose(2, 1, 0))  # of one power each
+        value = np.take(rows[-1], used, axis=1)
+        slope = np.zeros_like(value)
         for row in rows[-2::-1]:  # Horner's scheme, differentiated
-            slope = slope * tau + value
-            value = value * tau + row
+            slope *= tau
+            slope += value
+            value *= tau
+            value += np.take(row, used, axis=1)
         return value, slope, self.side[step]
 
     def accelerations(self, times: np.ndarray) -> np.ndarray:
