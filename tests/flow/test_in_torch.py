@@ -86,6 +86,8 @@ def test_a_start_without_derivative_does_not_spoil_the_parameters(torch):
     (by_weight,) = torch.autograd.grad(end({"load.force": weight}, start)[0], weight)
     assert by_weight == 0.0
     assert by_weight.dtype == torch.float32  # as its number was given
+    _, moved = torch.func.jvp(lambda force: end({"load.force": force}, start), (weight.detach(),), (torch.tensor(1.0),))
+    assert torch.equal(moved, torch.zeros(2).double())
     assert torch.isnan(torch.func.jacrev(lambda x: end({}, x))(start)).any()
 
 

@@ -282,6 +282,7 @@ class _StatesFunction:
             @staticmethod
             def setup_context(ctx: Any, inputs: Any, output: Any) -> None:
                 ctx.paths, *given = inputs
+                ctx.set_materialize_grads(False)  # columns that are nan do not spoil the others
                 ctx.save_for_backward(*given)
                 ctx.save_for_forward(*given)
 
