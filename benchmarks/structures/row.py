@@ -24,7 +24,8 @@ from structures.case import END, PERIODS, SWEPT, bar, by_scipy, chain, for_sicon
 TOLERANCES = {"ours": (1e-6, 1e-8, 1e-10), "SciPy": (1e-4, 1e-6, 1e-8)}
 STEPS = tuple(2000 * 4**k for k in range(4))
 EXACT = 1e-14
-BEFORE = 2  # coordinates of the structure, or cells of the chain, with which the kernels are compiled
+BEFORE, CELLS_BEFORE = 2, 3  # coordinates of the structure, and cells of the chain, with which the kernels are compiled
+TOGETHER, ALONE = 64, 8  # motions of an ensemble, and how many of them are followed one by one
 
 
 def timed(call: Callable[[], Any]) -> tuple[float, Any]:
@@ -39,6 +40,15 @@ def displaced(system: saltus.System, tol: float, start: dict[str, Any] | None = 
     model: Any = system.model
     motion = saltus.simulate(system, **(start or model.start()), duration=END, tol=tol, dense=False)
     return np.asarray(model.displacements(np.atleast_1d(motion.position)))
+
+
+def before(size: int) -> dict[str, Any]:
+    """Everything once, so that what no model changes is compiled."""
+    for row in (motion, orbit, sweep, ensemble):
+        row(size)
+    for chained in (cells, cells_together):
+        chained(CELLS_BEFORE)
+    return {}
 
 
 def motion(size: int) -> dict[str, Any]:
@@ -86,19 +96,49 @@ def sweep(size: int) -> dict[str, Any]:
     return _twice(lambda: saltus.frequency_sweep(bar(size), SWEPT, tol=1e-9, **_start(bar(size))))
 
 
+def ensemble(size: int) -> dict[str, Any]:
+    """Motions of an ensemble under pushes of 0.9 to 1.1 times the usual one."""
+    _together(bar(BEFORE), _start(bar(BEFORE)), "load.push.amplitude")
+    return _together(bar(size), _start(bar(size)), "load.push.amplitude")
+
+
 def cells(size: int) -> dict[str, Any]:
     """A motion of a chain of cells, and what its first call takes longer."""
 
     def follow(cells: int) -> Any:
-        system = chain(cells)
-        signs = {contact.coordinate: contact.sign for contact in system.model.contacts}
-        start = {name: signs[name] * (0.2 + 0.01 * i) for i, name in enumerate(system.model.coordinates)}
-        return saltus.simulate(system, **start, duration=END, tol=1e-8, dense=False)
+        return saltus.simulate(chain(cells), **_start_of_cells(cells), periods=PERIODS, tol=TOL, dense=False)
 
-    follow(BEFORE if size != BEFORE else BEFORE + 1)
-    first, _ = timed(lambda: follow(size))
-    again, _ = timed(lambda: follow(size))
-    return {"compile": first - again, "seconds": again / PERIODS, "peak": _peak()}
+    follow(CELLS_BEFORE)
+    found = _twice(lambda: follow(size))
+    return found | {"seconds": found["seconds"] / PERIODS}
+
+
+def cells_together(size: int) -> dict[str, Any]:
+    """The same of an ensemble."""
+    _together(chain(CELLS_BEFORE), _start_of_cells(CELLS_BEFORE), "load.horizontal.amplitude")
+    return _together(chain(size), _start_of_cells(size), "load.horizontal.amplitude")
+
+
+TOL = 1e-8  # of ensembles, and of motions of chains
+
+
+def _together(system: saltus.System, start: dict[str, Any], path: str) -> dict[str, Any]:
+    """The seconds of a motion and a forcing period in an ensemble, what its first call takes longer, and those without others."""
+    values = np.linspace(0.9, 1.1, TOGETHER) * system.get(path)
+    asked: dict[str, Any] = {**start, "periods": PERIODS, "tol": TOL}
+    found = _twice(lambda: saltus.simulate_many(system, **asked, sample=(), parameters={path: values}, threads=1))
+    systems = [system.with_({path: float(value)}) for value in values[:: TOGETHER // ALONE]]
+    alone = [timed(lambda: [saltus.simulate(each, **asked, dense=False) for each in systems])[0] for _ in range(2)]
+    each = found["seconds"] / (TOGETHER * PERIODS)
+    return found | {"seconds": each, "alone": min(alone) / (len(systems) * PERIODS)}
+
+
+def _start_of_cells(cells: int) -> dict[str, Any]:
+    """All layers open, the more so the farther along the chain."""
+    signs = [contact.sign for contact in chain(cells).model.contacts]
+    return {
+        name: sign * (0.2 + 0.01 * i) for i, (name, sign) in enumerate(zip(chain(cells).model.coordinates, signs, strict=True))
+    }
 
 
 def _start(system: saltus.System) -> dict[str, Any]:

@@ -1,6 +1,8 @@
 """Ensembles of models with several contacts: the same motions as the scalar kernel's, in lanes and on all cores."""
 
 import math
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -237,3 +239,36 @@ def test_a_gap_of_rounding_on_a_pressed_contact_without_loss_ends_a_lane_as_it_e
     kept = saltus.simulate_many(layers(e=(0.5, 0.5)), **start)
     assert str(stop_names(kept).values) == "horizon"
     assert int(kept.impact_count) == len(saltus.simulate(layers(e=(0.5, 0.5)), **start).impacts)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ManyBalls(saltus.ContactModel):
+    """Balls that fall through a little drag, each over a floor of its own: as many as bits of a whole number."""
+
+    weight: float = 1.0
+
+    coordinates: ClassVar[tuple[str, ...]] = tuple(f"x{i}" for i in range(64))
+    contacts: ClassVar[tuple[saltus.Contact, ...]] = tuple(
+        saltus.Contact(name=f"floor{i}", coordinate=f"x{i}") for i in range(64)
+    )
+
+    def force(self, t, q, v, load, *sides):
+        return tuple(-self.weight - 0.1 * rate for rate in v)
+
+
+@pytest.mark.thorough
+def test_lanes_know_which_of_64_contacts_are_closed():
+    """A number with a double's 53 bits would not: every third ball lies on its floor, the last one among them."""
+    system, factors = saltus.System(model=ManyBalls(), impact=saltus.NewtonImpact(e=0.6)), np.array([1.0, 1.05, 0.9])
+    heights = {f"x{i}": (0.0 if i % 3 == 0 else 0.3 + 0.01 * i) for i in range(64)}
+    found = saltus.simulate_many(system, **{name: height * factors for name, height in heights.items()}, duration=1.2)
+    for i, factor in enumerate(factors):
+        alone = saltus.simulate(system, **{name: height * factor for name, height in heights.items()}, duration=1.2)
+        closed = [
+            name
+            for j, name in enumerate(found.closed_contacts.attrs["flag_meanings"].split())
+            if int(found.closed_contacts[i]) >> j & 1
+        ]
+        assert closed == list(alone.closed) == [f"floor{j}" for j in range(0, 64, 3)]
+        assert found.impact_count[i] == len(alone.impacts) > 20
+        assert np.abs([found[name][i] for name in heights] - np.array(alone.position)).max() < 1e-14

@@ -285,3 +285,13 @@ def test_the_energies_of_contact_friction_and_soft_stop_close() -> None:
     motion = saltus.simulate(system, **structure.start(), periods=10)
     assert len(motion.events) > 20
     assert abs(float(saltus.energies(motion, periods=10).attrs["defect"])) < 1e-12
+
+
+def test_a_structure_without_modes_is_proved_to_stay_at_rest() -> None:
+    """A mass that its spring presses on a wall with 0.1 stays there under less."""
+    from saltus.bounds import keeps_rest
+
+    wall = saltus.Contact(name="wall", coordinate=0, position=0.1)
+    model = saltus.Structure(mass=[[2.0]], stiffness=[[1.0]], contacts=[wall], forces={"push": 0})
+    system = saltus.System(model=model, load=saltus.Load(frequency=0.7, push=saltus.Harmonic(0.05)))
+    assert keeps_rest(system, {"load.push.amplitude": np.array([0.05, 0.2])}).tolist() == [True, False]

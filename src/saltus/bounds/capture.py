@@ -13,7 +13,7 @@ import numpy as np
 from saltus.bounds.adiabatic_invariant import budget, first_guess, largest_start, normal_form
 from saltus.bounds.gap_equation import OPENING, SPEED, Leaves, Opening, reads
 from saltus.bounds.intervals import SLACK, Interval, enclose, enclosed_along
-from saltus.systems import System, broadcast_arrays, check_parameters, check_system, finite_array, parameter_table
+from saltus.systems import System, broadcast_arrays, check_parameters, check_system, finite_array, numbers, parameter_table
 from saltus.taylor import Expr, Trace, differentiate, number, record_tables, structure_key, substitute, trace
 
 Bounds = Callable[[Interval], Interval]
@@ -202,7 +202,7 @@ def keeps_rest(system: System, given: Mapping[str, np.ndarray]) -> np.ndarray:
         (n,), or (1,) for numbers alone.
     """
     traced, _ = _law_of(system)
-    arrays = (given.get(path, np.asarray(value)) for path, value in system.parameters.items())
+    arrays = (given.get(path, np.asarray(value)) for path, value in numbers(system))  # those of a structure's equations too
     columns = np.broadcast_arrays(*map(np.atleast_1d, arrays))
     size = columns[0].size if columns else 1
     if traced.records or traced.dependent or sorted(traced.contact_coordinates) != list(range(traced.dof)):

@@ -51,7 +51,7 @@ def record_events(lane, motion, events):
 def end_scalar(lane, motion):
     """Put into the lane which contacts are closed, and whether the scalar kernel must go on."""
     contacts = lane.contact_rows[lane.index][: lane.sizes.contacts]
-    lane.side = 1.0 + write_closed(lane, contacts)
+    write_closed(lane, contacts)
     lane.leave_by = motion.leave_by
     followed = lane.sizes.frictions > 0 or functions_of(lane).eigenmodes.size > 0
     if followed or motion.mode != Mode.ARC or not only_open(contacts):

@@ -20,15 +20,12 @@ from saltus.taylor.lane_vectors import absolute, bits, fma, mask, select, splat
 
 @lean_jit
 def write_closed(lane, contacts):
-    """Tell the model's functions which coordinates of a lane are free; returns its closed contacts as bits."""
-    closed = 0
+    """Tell the model's functions which coordinates of a lane are free."""
     for d in range(lane.sizes.local):
         lane.free[d] = 1.0
     for i in range(contacts.shape[0]):
         if contacts[i, ContactColumn.CLOSED] == 1:
-            closed |= 1 << i
             lane.free[contacts[i, ContactColumn.COORDINATE]] = 0.0
-    return closed
 
 
 @lean_jit
@@ -37,13 +34,11 @@ def read_contacts(lane, contacts):
 
     `WAITS` is kept: looking for the end of an accumulation too often could take as long as all its impacts.
     """
-    closed = int(lane.side) - 1
     for i in range(lane.sizes.contacts):
         coordinate = lane.sizes.coordinates[i]
-        there = lane.position[coordinate] == lane.contacts[i]
-        contacts[i, ContactColumn.COORDINATE], contacts[i, ContactColumn.CLOSED] = coordinate, closed >> i & 1
-        contacts[i, ContactColumn.SKIP] = 1 if there and not closed >> i & 1 else 0
-        contacts[i, ContactColumn.RELEASED] = 0
+        there, free = lane.position[coordinate] == lane.contacts[i], lane.free[coordinate] > 0.5
+        contacts[i, ContactColumn.COORDINATE], contacts[i, ContactColumn.CLOSED] = coordinate, 1 if there and not free else 0
+        contacts[i, ContactColumn.SKIP], contacts[i, ContactColumn.RELEASED] = 1 if there and free else 0, 0
 
 
 @inline_jit
@@ -162,7 +157,7 @@ def impulses_hold(lanes, closing):
 @lean_jit
 def take_impulses(lanes, closing):
     """Put the state after the impact, and the closed contacts, into the lanes of `closing`."""
-    chosen, side = mask(closing.hit), splat(1.0)
+    chosen = mask(closing.hit)
     for row in range(lanes.sizes.own):
         after = lanes.new_velocity[row]
         if row < lanes.sizes.local:
@@ -172,7 +167,6 @@ def take_impulses(lanes, closing):
     for i in range(lanes.sizes.contacts):  # all contacts before `free` changes: it still says which were closed
         concerned = closing_lanes(closing, i) | (closed_lanes(lanes, i) & closing.hit)
         stays = mask(concerned & bits(absolute(lanes.rates[i]) <= 0.0))
-        side = select(stays, side + 1.0 * (1 << i), side)
         lanes.stays[i] = select(stays, splat(1.0), splat(0.0))
         row, rate = lanes.sizes.coordinates[i], (1.0 * lanes.sizes.signs[i]) * lanes.rates[i]
         lanes.after_velocity[row] = select(mask(acting_lanes(lanes, closing, i)), rate + 0.0, lanes.after_velocity[row])
@@ -181,4 +175,3 @@ def take_impulses(lanes, closing):
     for i in range(lanes.sizes.contacts):
         row, stays = lanes.sizes.coordinates[i], mask(closing.hit & bits(lanes.stays[i] > 0.5))
         lanes.free[row] = select(stays, splat(0.0), lanes.free[row])
-    lanes.new_side = select(chosen, side, lanes.new_side)

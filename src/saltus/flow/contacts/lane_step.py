@@ -30,7 +30,7 @@ SMALL_GAP = 1e-9  # A gap smaller than this, when another one closes, may close 
 
 @lean_jit
 def begin_contact(lane, env, state):
-    """Tell a lane where its contacts are; returns the mode in which a motion begins, and 1 plus the bits of closed contacts."""
+    """Tell a lane where its contacts are; returns the mode in which a motion begins, and 1 for the side."""
     local, count, sizes = lane.sizes.local, lane.sizes.contacts, lane.sizes
     solved, contacts, matrices = lane.geometry[lane.index], lane.contact_rows[lane.index], lane.code.geometry
     matrices(env, lane.piece, lane.memory, solved)  # any state will do: positions depend on parameters alone
@@ -64,7 +64,20 @@ def begin_contact(lane, env, state):
                 row[FrictionColumn.SLIDES] = -1 if rate < 0.0 else 1
         mode = Mode.CONTACT if mode == Mode.ARC else mode
     lane.leave_by = 1 if mode == Mode.CONTACT else 0  # derivatives are then one-sided
-    return mode, 1 + write_closed(lane, contacts[:count])
+    write_closed(lane, contacts[:count])
+    return mode, 1
+
+
+@lean_jit
+def side_at_end(lane):
+    """1 plus the bits of the contacts that are closed at the end of a motion; within the step that went beyond it an impact may
+    have opened some of them."""
+    closed = 0
+    for i in range(lane.sizes.contacts):
+        row = lane.sizes.coordinates[i]
+        if lane.position[row] == lane.contacts[i] and (lane.free[row] < 0.5 or lane.velocity[row] == 0.0):
+            closed |= 1 << i
+    return 1 + closed
 
 
 @lean_jit

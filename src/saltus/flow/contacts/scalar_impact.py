@@ -62,7 +62,8 @@ def contacts_impact(lane, hit):
                 return 0
     if free == 0:
         return 0
-    lane.new_speed, lane.new_side = speed, 1.0 + write_closed(lane, contacts)
+    write_closed(lane, contacts)
+    lane.new_speed = speed
     for row in range(2 * own):
         lane.after_position[row] = state[row]
     return 1

@@ -9,7 +9,6 @@ from functools import cache
 from types import ModuleType
 from typing import Any
 
-from saltus.errors import ParameterError
 from saltus.flow.contacts import complementarity, lane_handoff, lane_impacts, scalar_impact
 from saltus.flow.contacts import impacts as contact_impacts
 from saltus.flow.contacts import lane_step as contacts_step
@@ -62,7 +61,6 @@ from saltus.taylor.vectors import LANES, WIDTH
 
 _TYPES = (kernel_memory, function_types, memory, vectors, lane_memory, lane_vectors)
 _WRITTEN_BY = digest(*(source_of(module) for module in _TYPES))
-MOST_IN_LANES = sys.float_info.mant_dig  # contacts: which are closed is noted in the bits of a double
 _SIGNATURES = f"""import math
 
 import numpy as np
@@ -163,10 +161,6 @@ def compile_beside(driver: subprocess.Popen[bytes], several: bool) -> None:
 
 def memory_plan(trace: Trace) -> MemoryPlan:
     """The memory that a structure needs."""
-    if len(trace.signs) > MOST_IN_LANES:
-        raise ParameterError(
-            f"{trace.model} has {len(trace.signs)} contacts, and ensembles follow at most {MOST_IN_LANES}: use simulate", "system"
-        )
     equations = one_free(trace)
     return MemoryPlan(
         rows=len(trace.acceleration),

@@ -10,7 +10,7 @@ import numpy as np
 from saltus.flow.kernel.layout import Mode, Status
 from saltus.flow.lanes.memory import BURST, LONGEST_RECURRENCE, MOST_IMPACTS
 from saltus.flow.lanes.sampling import recurrence_period
-from saltus.flow.one_contact.lane_step import begin_contact
+from saltus.flow.one_contact.lane_step import begin_contact, side_at_end
 from saltus.taylor import inline_jit, lean_jit
 
 # --- compiled from here on -----------------------------------------------------------------------------------------------
@@ -260,7 +260,7 @@ def finish(lane, status, detail):
     if lane.sizes.columns > 0 and lane.mode == Mode.ARC:
         write_rates(lane)
     end.status, end.detail, end.mode, end.grazings = status, detail, lane.mode, lane.grazings
-    end.side, end.period = int(lane.side), int(lane.period)
+    end.side, end.period = side_at_end(lane), int(lane.period)
     end.impacts, end.periods_done = int(lane.overall_impacts), int(lane.periods_done)
     lane.busy &= ~bit
     lane.scalar &= ~bit

@@ -248,9 +248,8 @@ class _StatesFunction:
 
         def product(ctx: Any) -> Any:
             """The derivatives of all states, as the rows of a matrix for each motion: to the start, then to the numbers."""
-            numbers, start = ctx.saved_tensors
-            found = Columns.apply(ctx.paths, numbers, start)
-            return found.reshape(*start.shape[:-1], -1, found.shape[-1])
+            found = Columns.apply(ctx.paths, *ctx.saved_tensors)
+            return found.reshape(*ctx.saved_tensors[1].shape[:-1], -1, found.shape[-1])
 
         class Function(torch.autograd.Function):  # type: ignore[misc, name-defined]
             @classmethod

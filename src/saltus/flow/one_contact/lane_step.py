@@ -34,6 +34,12 @@ def begin_contact(lane, env, state):
 
 
 @inline_jit
+def side_at_end(lane):
+    """The side at the end of a motion."""
+    return int(lane.side)
+
+
+@inline_jit
 def rate_on(lanes, side):
     """The gap's rate of change with the coordinate, on a side."""
     return select(mask(bits(side > 0.0)), lanes.rate_up, lanes.rate_down)
