@@ -33,9 +33,9 @@ class SweepSettings:
     )
     neighbours: int = 10  # Number of steps around it of which the median is taken.
     least_step: float = 0.002  # Steps below this share of the largest amplitude are invisible in a plot, and are not examined.
-    # A large step is swept again in 32 parts, and the part that contains the change again in parts of 1/1024 of the step:
-    # transients become shorter with the parts, so that the jump of a slow sweep is left.
-    parts: tuple[int, ...] = (32, 1024)
+    # A large step is swept again in 10 parts, and from the part that contains the change on in parts of 1/100 and then of 1/1024
+    # of the step: transients become shorter with the parts, so that the jump of a slow sweep is left.
+    parts: tuple[int, ...] = (10, 100, 1024)
     kept: float = (
         0.1  # The share of the step that must be left in one part, if it is a jump; a root, as near a fold, leaves 0.03.
     )
