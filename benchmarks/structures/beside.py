@@ -39,16 +39,19 @@ extrapolated at first order. An *ensemble* is of 64 motions, at tol 1e-8; what a
 
 
 def beside_structures(about: dict[str, Any], quick: bool = False, folder: Path = RESULTS, again: bool = False) -> None:
-    """Measure what is not kept yet, and write structures.json and structures.md into `folder`."""
+    """Measure what is not kept yet, and write structures.json and structures.md into `folder` after each row."""
     start, sizes, cells = time.perf_counter(), QUICK_SIZES if quick else SIZES, QUICK_CELLS if quick else CELLS
     asked = [(task, n) for n in sizes for task in (*CODES, "ensemble", "orbit", "sweep")]
-    asked += [(task, n) for n in cells for task in ("cells", "cells_together")]
+    asked += [(task, n) for n in cells for task in ("cells", "cells_together", "cells_differentiated")]
+    rows: dict[str, Any] = {f"{task} {n}": {"fails": "not run"} for task, n in asked}
     with tempfile.TemporaryDirectory() as cache:  # all rows share their kernels, and none finds its structure compiled
         make = _Rows(about, LIMIT_OF_QUICK if quick else LIMIT, Path(cache), again)
-        rows = {f"{task} {n}": make.row(task, n) for task, n in asked}
-    results = {"about": about, "rows": rows}
-    write_text(folder / "structures.json", json.dumps(results, indent=1) + "\n")
-    print(write_text(folder / "structures.md", report(results)).read_text())
+        for task, n in asked:  # written after each row, so that a run that is broken off leaves a table
+            rows[f"{task} {n}"] = make.row(task, n)
+            results = {"about": about, "rows": rows}
+            write_text(folder / "structures.json", json.dumps(results, indent=1) + "\n")
+            written = write_text(folder / "structures.md", report(results))
+    print(written.read_text())
     print(f"structures: {time.perf_counter() - start:.0f} s", flush=True)
 
 
@@ -120,6 +123,10 @@ def report(results: dict[str, Any]) -> str:
     lines = [(*line, *_cells(rows[f"cells_together {line[0]}"], *TOGETHER)) for line in _alone(rows, "cells")]
     head = ("cells", "compiling, s", "a period, us", "MiB", *together)
     parts.append("## Chains of cells, at tol 1e-8\n\n" + table(head, lines))
+    head = ("cells", "compiling, s", "a period, us", "MiB")
+    parts.append(
+        "## Derivatives of chains, to the start and one parameter\n\n" + table(head, _alone(rows, "cells_differentiated"))
+    )
     return "\n\n".join(parts) + "\n"
 
 

@@ -43,9 +43,9 @@ def bar(size: int) -> saltus.System:
 
 
 def chain(cells: int) -> saltus.System:
-    """A row of cells of the paper under a load, for saltus."""
+    """A row of cells of the paper under a load, for saltus; with both masses, as a motion ends where a massless one is free."""
     return saltus.System(
-        model=saltus.CellChain(cells=cells, beta0=math.radians(80), damping=0.1),
+        model=saltus.CellChain(cells=cells, beta0=math.radians(80), damping=0.1, mass_ratio=1.0),
         load=saltus.Load(frequency=1.0, horizontal=saltus.Harmonic(0.5), vertical=-0.5),
         impact=saltus.NewtonImpact(e=0.0),
     )

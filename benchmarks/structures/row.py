@@ -46,7 +46,7 @@ def before(size: int) -> dict[str, Any]:
     """Everything once, so that what no model changes is compiled."""
     for row in (motion, orbit, sweep, ensemble):
         row(size)
-    for chained in (cells, cells_together):
+    for chained in (cells, cells_together, cells_differentiated):
         chained(CELLS_BEFORE)
     return {}
 
@@ -106,7 +106,9 @@ def cells(size: int) -> dict[str, Any]:
     """A motion of a chain of cells, and what its first call takes longer."""
 
     def follow(cells: int) -> Any:
-        return saltus.simulate(chain(cells), **_start_of_cells(cells), periods=PERIODS, tol=TOL, dense=False)
+        found = saltus.simulate(chain(cells), **_start_of_cells(cells), periods=PERIODS, tol=TOL, dense=False)
+        assert found.stop == "horizon", found.stop  # a motion that ends before would be cheap
+        return found
 
     follow(CELLS_BEFORE)
     found = _twice(lambda: follow(size))
@@ -117,6 +119,18 @@ def cells_together(size: int) -> dict[str, Any]:
     """The same of an ensemble."""
     _together(chain(CELLS_BEFORE), _start_of_cells(CELLS_BEFORE), "load.horizontal.amplitude")
     return _together(chain(size), _start_of_cells(size), "load.horizontal.amplitude")
+
+
+def cells_differentiated(size: int) -> dict[str, Any]:
+    """The same of a motion with its derivatives to the start and to the load."""
+
+    def follow(cells: int) -> Any:
+        asked: dict[str, Any] = {**_start_of_cells(cells), "periods": PERIODS, "tol": TOL}
+        return saltus.sensitivities(chain(cells), parameters=["load.horizontal.amplitude"], **asked)
+
+    follow(CELLS_BEFORE)
+    found = _twice(lambda: follow(size))
+    return found | {"seconds": found["seconds"] / PERIODS}
 
 
 TOL = 1e-8  # of ensembles, and of motions of chains

@@ -268,21 +268,13 @@ class CellChain(LayeredCell, ContactModel):
 
     Parameters
     ----------
-    beta0
-        The angle of the undeformed cell, rad, in (0, pi).
+    beta0, damping, stiffness_ratio, mass_ratio, dissipation_ratio
+        As for `TwoLayer`, the same in all cells.
     cells
         How many cells there are, from 1 to 32. It is part of the structure, as the classes of a system's parts are: its equations
         are compiled for each number of cells, and nothing is computed along it.
     coupling
         kappa, the stiffness of a spring times length squared, over K2; at least 0.
-    damping
-        C, the damping of the upper layer, at least 0.
-    stiffness_ratio
-        k = K1 / K2, above 0.
-    mass_ratio
-        m = M1 / M2, at least 0.
-    dissipation_ratio
-        c = C1 / C2, at least 0.
 
     Raises
     ------
