@@ -295,8 +295,11 @@ def ordered(roots: list[Expr]) -> list[Expr]:
             order.append(node)
         elif id(node) not in seen:
             seen.add(id(node))
-            stack.append((node, True))
-            stack.extend((a, False) for a in reversed(node.args))
+            if node.args:
+                stack.append((node, True))
+                stack.extend([(a, False) for a in reversed(node.args) if id(a) not in seen])
+            else:
+                order.append(node)
     return order
 
 
