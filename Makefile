@@ -15,7 +15,7 @@ COMPILE := $(BIN)/python -m compileall -qq -j 0 -x '[/\\]tests[/\\]' $(VENV)/lib
 help:
 	@echo "make reproduce   compute and draw the paper into results/"
 	@echo "make test        lint, type-check and run the tests"
-	@echo "make thorough    run the tests that take minutes each: many structures, many random cases, whole figures"
+	@echo "make thorough    run the tests that take long: many structures, many random cases, whole figures, most examples of one thing"
 	@echo "make release-check   compute the whole paper anew and judge every claim at full size"
 	@echo "make bench       measure speed against other integrators, side by side"
 	@echo "make docs        build the documentation as a site, docs/_build/html/index.html; needs no network once it is installed"

@@ -402,6 +402,13 @@ LONGEST = {
     "shaken_table.py",
     "belt.py",
     "smoothing.py",
+    "falling_block.py",
+    "bilinear.py",
+    "orbits.py",
+    "harvester.py",
+    "piezo_harvester.py",
+    "elastic_bar.py",
+    "overturning.py",
 }  # seconds each; the gallery of `make docs` runs all of them
 
 

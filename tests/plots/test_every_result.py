@@ -28,6 +28,11 @@ from saltus.result import Result
 
 PANELS = ("saltus.simulate", "saltus.find_orbit", "saltus.free_orbit", "saltus.doubling_cascade", "saltus.chaotic_bands")
 PANELS += ("saltus.response_spectrum", "saltus.bifurcation_diagram")
+# Of the same class as another one that is drawn and written here.
+SIBLINGS = ("saltus.bifurcation_diagram", "saltus.switch_branch", "attractors.unstable_manifold")
+every_result = pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.thorough if name in SIBLINGS else ()) for name in RESULTS]
+)
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +68,7 @@ def test_every_public_function_has_a_result_here_or_a_reason():
     assert functions == {*RESULTS, *WITHOUT}, checked
 
 
-@pytest.mark.parametrize("name", RESULTS)
+@every_result
 def test_a_result_is_drawn_into_axes_that_are_given(name, results):
     result, size = results(name), plt.rcParams["font.size"]
     figure = plt.figure()
@@ -108,7 +113,7 @@ def numbers_on(axis):
     return [label for place, label in ticks if low <= place <= high and label.get_window_extent().width]
 
 
-@pytest.mark.parametrize("name", RESULTS)
+@every_result
 def test_a_picture_of_its_own_names_every_axis_with_its_unit_and_cuts_no_text(name, pictures):
     axes = pictures(name)
     figure = plots.figure_of(axes)
@@ -131,7 +136,7 @@ def test_a_picture_of_its_own_names_every_axis_with_its_unit_and_cuts_no_text(na
                 assert box.y1 < height + 1.0, text
 
 
-@pytest.mark.parametrize("name", RESULTS)
+@every_result
 def test_numbers_on_an_axis_do_not_overlap(name, pictures):
     for ax in np.ravel(pictures(name)).tolist():
         boxes = [label.get_window_extent() for label in numbers_on(ax.xaxis)]
@@ -143,7 +148,7 @@ def each(result):
     return result if isinstance(result, tuple) else (result,)
 
 
-@pytest.mark.parametrize("name", RESULTS)
+@every_result
 def test_a_result_becomes_files_and_tables(name, results, tmp_path):
     """What is read back is what was written, with its kind; MATLAB's file has every variable; and a table has rows."""
     for result in each(results(name)):
