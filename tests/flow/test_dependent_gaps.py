@@ -90,10 +90,10 @@ def test_rows_of_unequal_masses_between_walls_keep_the_balances(seed):
 
 @pytest.mark.thorough
 def test_ten_thousand_rows_between_walls_keep_the_balances():
-    """About one in sixty is refused: balls that collapse without a force, whose reactions are 0 up to rounding."""
+    """About one in three hundred is refused, with its contacts: balls that collapse beside others that still move."""
     impacts, refused = checked([row_between_walls(count) for count in range(2, 9)], check_balances, np.random.default_rng(11))
     assert impacts > 100_000
-    assert refused <= 250
+    assert refused <= 60
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -248,8 +248,25 @@ def test_what_has_no_motion_is_refused_by_name():
         System(model=dataclasses.make_dataclass("Corner", [], bases=(ContactModel,), namespace=space, frozen=True)())
     with pytest.raises(saltus.ParameterError, match="whose contacts can all be closed, and here gaps depend"):
         saltus.flow.load_releases(under_a_ceiling(1.3, 0.9))
-    with pytest.raises(saltus.MotionError, match=r"at 'table' .* and 'ceiling' .* from time 0.8776"):  # where sin(t) = 1 / 1.3
-        simulate(under_a_ceiling(1.3, 0.6, height=1.0), x=0.5, duration=3.0)
+
+
+@pytest.mark.parametrize("e", [0.6, 0.0])
+def test_a_ball_that_a_table_crushes_at_a_ceiling_is_refused_when_the_room_is_gone(e):
+    """The table reaches the ceiling at the height 1 where sin(t) = 1 / 1.3, however often the ball is hit before."""
+    with pytest.raises(saltus.MotionError, match=r"crushed between the contacts 'table' and 'ceiling' at time 0\.877636419,"):
+        simulate(under_a_ceiling(1.3, e, height=1.0), x=0.5, duration=3.0)
+    assert math.asin(1.0 / 1.3) == pytest.approx(0.877636419, abs=5e-10)
+
+
+def test_a_row_that_collapses_at_a_wall_without_a_force_is_followed():
+    """Gaps of 1e-12 that its accumulation closes leave reactions of no certain sign, which decide nothing."""
+    random = np.random.default_rng(11)
+    for i in range(247):
+        count = 2 + i % 7
+        random.uniform(size=count + 2)
+        random.uniform(size=count)
+        random.normal(size=count)
+    assert check_balances(row_between_walls(4), random) == 0  # contacts are held
 
 
 PATHS = ("model.gravity", "model.height", "load.ground.amplitude", "load.frequency", "impact.e")

@@ -279,6 +279,16 @@ class InGapCoordinates(ContactModel):
         free = [1.0 - np.any([np.zeros(len(t), dtype=bool), *own], axis=0)[:, None] for own in held]
         return solved_motion(self, t, q, v, load, free).along
 
+    def close_in(self, t: Any, load: Any, state: np.ndarray, chosen: Sequence[int]) -> bool:
+        """Whether these contacts leave less and less room between them: a sum of their gaps with positive weights does not depend
+        on the state, and falls."""
+        first, signs = len(self.coordinates) - self.dependent, np.array([self.contacts[i].sign for i in chosen])
+        places = [self.coordinates.index(self.contacts[i].coordinate) for i in chosen]
+        rows = signs[:, None] * np.vstack([np.eye(first), np.array(self.sum_rows())[:, :first]])[places]
+        weights, rates = np.linalg.svd(rows.T)[2][-1], signs * np.split(self.completed(t, load, state), 2)[1][places]
+        opposed = min(weights.max(), -weights.min()) < 0.0 and np.abs(weights @ rows).max() < CLOSED_BELOW
+        return bool(opposed and (weights @ rates) * weights.sum() < 0.0)
+
     def _sums_and_rates(self, t: Any, load: Any, state: np.ndarray) -> list[list[Any]]:
         """Dependent sums and their rates, as they follow from the other coordinates of a state."""
         q, v = (tuple(half.tolist()) for half in np.split(state, 2))

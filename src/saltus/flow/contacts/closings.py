@@ -69,7 +69,7 @@ from saltus.flow.contacts.tangent import (
     note_velocities,
     slope,
 )
-from saltus.flow.kernel.layout import EventCode, Status
+from saltus.flow.kernel.layout import ZERO, EventCode, Status
 from saltus.flow.kernel.roots import leading
 from saltus.flow.kernel.steps import expand, forget
 from saltus.taylor import jit, lean_jit
@@ -78,23 +78,23 @@ from saltus.taylor import jit, lean_jit
 
 
 @lean_jit
-def violated(motion, candidates):
-    """The candidates of which the first non-zero Taylor coefficient of the guard contradicts the choice of closed contacts, as
-    bits; notes how many coefficients before it are 0."""
+def violated(motion, candidates, zero):
+    """The candidates of which the first Taylor coefficient of the guard above `zero` contradicts the choice of closed contacts,
+    as bits; notes how many coefficients before it are 0."""
     order, g, count, wrong = motion.order, motion.gap_series, motion.contacts.shape[0], 0
     for i in range(count):
         if not candidates >> i & 1:
             continue
         known = motion.contacts[i, ContactColumn.RELEASED]
         if motion.contacts[i, ContactColumn.CLOSED] == 1:
-            k = leading(motion.margin_series[i], known, order)
+            k = leading(motion.margin_series[i], known, order, zero)
             if k < order and motion.margin_series[i, k] < 0.0:
                 wrong |= 1 << i
         else:
             gap_series(motion, i, contact_position(motion, i), order, g)
             if known == 1 and rubs_along(motion, i) and abs(g[2]) > ALIKE:
                 known = 0  # its friction has changed with the release
-            k = leading(g, 2 + known, order)
+            k = leading(g, 2 + known, order, zero)
             if k == order or g[k] < 0.0:
                 wrong |= 1 << i
         motion.contacts[i, ContactColumn.SKIP] = k
@@ -102,7 +102,7 @@ def violated(motion, candidates):
 
 
 @lean_jit
-def exchange_closed(motion, candidates, still, t):
+def exchange_closed(motion, candidates, still, t, zero):
     """As `choose_closed`, where there are too many contacts for trying all choices: by exchanges (`complementarity.py`)."""
     count = motion.contacts.shape[0]
     for number in range(3 ** motion.frictions.shape[0]):
@@ -116,7 +116,7 @@ def exchange_closed(motion, candidates, still, t):
             hold_coordinates(motion)
             hold_frictions(motion)
             expand(motion, t, 1.0, motion.order)
-            wrong = violated(motion, candidates)
+            wrong = violated(motion, candidates, zero)
             if not wrong:
                 break
             closed, least = exchanged(closed, wrong, least)
@@ -126,7 +126,7 @@ def exchange_closed(motion, candidates, still, t):
 
 
 @lean_jit
-def choose_closed(motion, candidates, still, t):
+def choose_closed(motion, candidates, still, t, zero):
     """Decide which of the candidates, which are at rest at their positions, stay closed; False if no choice is consistent.
 
     The choice fulfils 0 <= reaction _|_ second derivative of the gap >= 0; where both are 0, their first non-zero derivatives
@@ -135,7 +135,7 @@ def choose_closed(motion, candidates, still, t):
     """
     count = motion.contacts.shape[0]
     if count > MOST_TRIED:
-        return exchange_closed(motion, candidates, still, t)
+        return exchange_closed(motion, candidates, still, t, zero)
     for number in range((1 << count) * 3 ** motion.frictions.shape[0]):
         choice = number & ((1 << count) - 1)  # the bits of those that open
         if choice & ~candidates:
@@ -148,7 +148,7 @@ def choose_closed(motion, candidates, still, t):
         hold_coordinates(motion)
         hold_frictions(motion)
         expand(motion, t, 1.0, motion.order)
-        agrees = violated(motion, candidates) == 0
+        agrees = violated(motion, candidates, zero) == 0
         if agrees and slides_so(motion, count, still):
             return True
     return False
@@ -256,7 +256,7 @@ def rates_between(motion, t, hit):
     """Fill the accelerations between two impacts in a row, after that of `hit`; returns the closed contacts that open, as
     bits."""
     candidates = closed_bits(motion)
-    if candidates & hit and not choose_closed(motion, candidates, 0, t):
+    if candidates & hit and not choose_closed(motion, candidates, 0, t, ZERO):
         for i in range(motion.contacts.shape[0]):
             motion.contacts[i, ContactColumn.CLOSED] = candidates >> i & 1
     hold_coordinates(motion)

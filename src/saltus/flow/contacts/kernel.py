@@ -50,6 +50,7 @@ from saltus.flow.contacts.layout import (
     GAP_ROUNDING,
     MOST_TRIED,
     NEAR,
+    TIED,
     TRIED_AGAIN,
     ContactColumn,
     FrictionColumn,
@@ -164,8 +165,7 @@ def decide_columns(motion, t):
 @lean_jit
 def decide_contacts(motion):
     """Decide which contacts are closed and which frictions stick from here on. Returns PAUSED to go on, or NOT_UNIQUE."""
-    t, count = motion.time, motion.contacts.shape[0]
-    rested = motion.rested == 1
+    t, count, rested = motion.time, motion.contacts.shape[0], motion.rested == 1
     event_shifts(motion)
     settled = end_accumulation_of(motion, t)
     candidates, before = closed_bits(motion), slides_before(motion)
@@ -173,10 +173,10 @@ def decide_contacts(motion):
     if motion.leave_by == 1 and not begin_on_surfaces(motion, t):
         return Status.NOT_UNIQUE
     still = undecided(motion)
-    if (candidates or still) and not choose_closed(motion, candidates, still, t):
+    if (candidates or still) and not choose_closed(motion, candidates, still, t, ZERO):
         note_ties(motion, candidates, t)
-        if not choose_closed(motion, candidates, still, t):
-            return Status.NOT_UNIQUE
+        if not (choose_closed(motion, candidates, still, t, ZERO) or choose_closed(motion, candidates, still, t, 1e3 * TIED)):
+            return Status.NOT_UNIQUE  # where nothing presses, what an accumulation leaves of gaps decides nothing
     hold_coordinates(motion)
     hold_frictions(motion)
     opened = candidates & ~closed_bits(motion)

@@ -219,10 +219,10 @@ def margin_root(m, order, h, poly):
 
 
 @lean_jit
-def leading(coefficients, start, order):
-    """The index from `start` on of the first coefficient that is not zero to within ZERO; `order` if there is none."""
+def leading(coefficients, start, order, zero=ZERO):
+    """The index from `start` on of the first coefficient that is larger than `zero`; `order` if there is none."""
     for k in range(start, order):
-        if abs(coefficients[k]) > ZERO:
+        if abs(coefficients[k]) > zero:
             return k
     return order
 

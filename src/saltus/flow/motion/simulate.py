@@ -16,9 +16,9 @@ from saltus.flow.kernel.layout import Mode, Status
 from saltus.flow.motion.events import Stop
 from saltus.flow.motion.kernel_state import MOST, Again, ContactState, KernelState, Recorder, remember, time_of
 from saltus.flow.motion.motion import Motion, in_own_coordinates, motion_of
-from saltus.flow.motion.validity import DenseOutput
+from saltus.flow.motion.validity import DenseOutput, crushed, paradox
 from saltus.progress import Progress, silent
-from saltus.systems import System, check_system, friction_margins, read_start
+from saltus.systems import System, check_system, read_start
 from saltus.taylor import structure_key
 
 # The arguments of `simulate` and `sensitivities`: a misspelt one arrives among the coordinates.
@@ -332,6 +332,7 @@ def _advance(request: MotionRequest, run: Program, now: KernelState, recorder: R
             return status, numbers
         if recorder.total > counted + many:
             if time < checked_at + unit:
+                _refuse_crushed(system, now, recorder.last_hit() if system.model.contacts else [])
                 raise MotionError(
                     f"more than {many} impacts{_at_contacts(system, recorder)} from time {checked_at:.6g} to {time:.6g}: "
                     f"{_why_so_many(system, recorder)}, or ask for a shorter time"
@@ -365,6 +366,15 @@ def _why_so_many(system: System, recorder: Recorder) -> str:
     return "they accumulate too slowly to be followed; raise the loss at impact"
 
 
+def _refuse_crushed(system: System, now: KernelState, chosen: list[int]) -> None:
+    """Refuse a motion in which these contacts close in on a body between them."""
+    own, first = now.numbers.own, now.numbers.dof
+    if sentence := crushed(
+        system, time_of(now.numbers), np.concatenate([now.state[:own], now.state[first : first + own]]), chosen
+    ):
+        raise MotionError(sentence)
+
+
 def _refuse(system: System, status: int, now: KernelState) -> None:
     """Raise an error, with a sentence, for a status that is no regular end of a motion."""
     numbers = now.numbers
@@ -372,30 +382,11 @@ def _refuse(system: System, status: int, now: KernelState) -> None:
     position, velocity = now.state[:own], now.state[numbers.dof : numbers.dof + own]
     sentence = refusal(system, status, f"{time:.9g}", f"{velocity[0]:.6g}")
     if status in (Status.NOT_UNIQUE, Status.NO_IMPACT):
-        sentence = _paradox(system, time, (tuple(position), tuple(velocity))) or sentence
+        gaps = [each.gap(position[system.model.coordinates.index(each.coordinate)]) for each in system.model.contacts]
+        _refuse_crushed(system, now, [i for i, gap in enumerate(gaps) if np.isclose(gap, 0.0)])
+        sentence = paradox(system, time, (tuple(position), tuple(velocity))) or sentence
     if sentence is not None:
         raise MotionError(sentence)
-
-
-def _paradox(system: System, time: float, state: tuple[Any, Any]) -> str:
-    """At which contact Painleve's paradox leaves no reaction or several, in words; empty if at none."""
-    if not system.model.holds_coordinates or all(friction.contact is None for friction in system.contact_model.frictions):
-        return ""
-    model = system.contact_model
-    gaps = {contact: contact.gap(state[0][model.coordinates.index(contact.coordinate)]) for contact in model.contacts}
-    closed = {contact.name: contact.coordinate for contact, gap in gaps.items() if np.isclose(gap, 0.0)}  # or just closing
-    free = [float(name not in closed.values()) for name in model.coordinates]
-    one, other = (friction_margins(model, time, *state, system.load, free, [s] * len(model.frictions)) for s in (1.0, -1.0))
-    for friction in (each for each in model.frictions if each.contact in closed):
-        pair = np.array([one[friction.limit], other[friction.limit]]) / (0.5 * (one[friction.limit] + other[friction.limit]))
-        if pair.min() <= 0.0:
-            way = "forwards" if pair[0] < pair[1] else "backwards"
-            return (
-                f"{friction.limit} at time {time:.9g}: while {friction.name} slides {way} no reaction is possible or several "
-                f"are, as 1 + s mu m_nt / m_tt must be positive and is {pair.min():.6g}, with the mass matrix m of what is free; "
-                "choose a smaller coefficient or another position"
-            )
-    return ""
 
 
 def refusal(system: System, status: int, time: str, velocity: str) -> str | None:

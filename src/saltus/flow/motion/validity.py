@@ -1,7 +1,8 @@
-"""Dense output, the Taylor series of every step, and the validity of a motion, by the margins along it."""
+"""Dense output, the Taylor series of every step, the validity of a motion, by the margins along it, and why none leads beyond."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from saltus.flow.kernel.layout import LOSSLESS
 from saltus.progress import html_table, rows_table
-from saltus.systems import System, energy_gain
+from saltus.systems import System, energy_gain, friction_margins
 
 STEP_SAMPLES = 12  # samples in each step to find changes of sign; a step is shorter than the time scale of a margin
 RIDDERS_ITERATIONS = 8  # of Ridders' method, each of which doubles the correct digits or at least halves the bracket
@@ -238,3 +239,36 @@ def _margins(
     if len(system.model.coordinates) == 1:
         theta, velocity, acceleration = theta[0], velocity[0], acceleration[0]
     return system.model.margins(dense.start[step] + tau, theta, velocity, acceleration, dense.side[step], system.load)
+
+
+def crushed(system: System, time: float, state: np.ndarray, chosen: Sequence[int]) -> str:
+    """Which contacts close in on a body between them at a state, of those that are chosen, in words; empty if none do."""
+    model: Any = system.model
+    if not system.dependent or len(chosen) < 2 or not model.close_in(time, system.load, state, chosen):
+        return ""
+    names = " and ".join(repr(model.contacts[i].name) for i in chosen)
+    return (
+        f"a body is crushed between the contacts {names} at time {time:.9g}, which leave it no room there: no motion leads "
+        "beyond; ask for a shorter time"
+    )
+
+
+def paradox(system: System, time: float, state: tuple[Any, Any]) -> str:
+    """At which contact Painleve's paradox leaves no reaction or several, in words; empty if at none."""
+    if not system.model.holds_coordinates or all(friction.contact is None for friction in system.contact_model.frictions):
+        return ""
+    model = system.contact_model
+    gaps = {contact: contact.gap(state[0][model.coordinates.index(contact.coordinate)]) for contact in model.contacts}
+    closed = {contact.name: contact.coordinate for contact, gap in gaps.items() if np.isclose(gap, 0.0)}  # or just closing
+    free = [float(name not in closed.values()) for name in model.coordinates]
+    one, other = (friction_margins(model, time, *state, system.load, free, [s] * len(model.frictions)) for s in (1.0, -1.0))
+    for friction in (each for each in model.frictions if each.contact in closed):
+        pair = np.array([one[friction.limit], other[friction.limit]]) / (0.5 * (one[friction.limit] + other[friction.limit]))
+        if pair.min() <= 0.0:
+            way = "forwards" if pair[0] < pair[1] else "backwards"
+            return (
+                f"{friction.limit} at time {time:.9g}: while {friction.name} slides {way} no reaction is possible or several "
+                f"are, as 1 + s mu m_nt / m_tt must be positive and is {pair.min():.6g}, with the mass matrix m of what is free; "
+                "choose a smaller coefficient or another position"
+            )
+    return ""
