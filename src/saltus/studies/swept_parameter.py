@@ -280,6 +280,16 @@ class _Step:
     found: tuple[float, ...]  # the values before and after the change, and the amplitudes there
     ended: bool = False  # whether a margin has ended the slower sweep
 
+    @property
+    def change(self) -> float:
+        """How much the amplitude changes where it changes most, as far as it is known."""
+        return abs(self.found[3] - self.found[2])
+
+    @property
+    def is_left(self) -> bool:
+        """Whether so much of the step is left there that it may be a jump."""
+        return self.change >= SETTINGS.kept * abs(self.after - self.before)
+
     def goes_on(self, value: float, rows: Recurrence, i: int) -> bool:
         """Take the motion at the next value; returns whether the change is still to come."""
         size, self.ended = amplitude_of(rows, i), bool(rows.ended[i])
@@ -303,8 +313,8 @@ def _jumps(asked: SweepRequest, runs: Mapping[str, _OneWay], progress: Progress)
     levels = SETTINGS.parts if asked.stop_early else ()
     for k, parts in enumerate(levels):
         _sweep_parts(asked, steps, parts, part_of(progress, k / len(levels), (k + 1) / len(levels)))
-    sizes = [(step, abs(step.found[3] - step.found[2]), SETTINGS.kept * abs(step.after - step.before)) for step in steps]
-    return [(step.direction, *step.found) for step, size, kept in sizes if size >= max(kept, least[step.direction])]
+        steps = [step for step in steps if step.is_left]  # a smooth change is spread over its parts
+    return [(step.direction, *step.found) for step in steps if step.is_left and step.change >= least[step.direction]]
 
 
 def _sweep_parts(asked: SweepRequest, steps: list[_Step], parts: int, progress: Progress) -> None:
