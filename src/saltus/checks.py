@@ -43,7 +43,7 @@ class Limits:
     nodes: int = 100_000  # Operations of any kind in these equations that take a minute to compile.
     optimised: int = 8  # Coordinates of a model whose code always goes through LLVM's passes, whose time grows faster than it.
     lanes: float = 3.0  # The factor of the time of compiling for vector lanes; 2.7 was measured.
-    compiling: float = 5.0  # The most minutes of compiling for lanes or derivatives, of which those of four cells need some.
+    compiling: float = 5.0  # The most minutes of compiling for lanes or derivatives; those of 32 cells are estimated at two.
     memory: float = 0.8  # The share of the free memory that one request may take: the rest keeps the machine usable.
     letters: float = 2e5  # Letters of LLVM's text that are compiled in a second; 1.7e5 to 3.5e5 were measured.
     unsaid: float = 2.0  # Seconds of compiling without a word to whoever watches the progress.

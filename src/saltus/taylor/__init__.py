@@ -4,9 +4,10 @@ The path of an equation. `tracing.py` runs a model once on symbols, which gives 
 differentiates it where a tangent is asked for. `memory.py` lists the nodes on tapes, operands first, and has the places of the
 code's arguments. Of a structure's functions, each with its tapes, `generated.py` makes LLVM's text: `series.py` (Taylor
 coefficients) and `instant` (values at one instant) write the instructions by the rules of `rules.py`, for one motion on plain
-doubles, for an ensemble on vectors with one double for each lane. `generated.py` also compiles it by llvmlite, without numba.
-`vectors.py` has the arithmetic on which it is written; `lane_vectors.py` gives numba the same vectors for the ensemble's
-own loops. There is no second generator, and each function has one rule.
+doubles, for an ensemble on vectors with one double for each lane. The columns of a tangent are loops there, whose slopes are
+series of the motion (`Loops`). `generated.py` also compiles it by llvmlite, without numba. `vectors.py` has the arithmetic on
+which it is written; `lane_vectors.py` gives numba the same vectors for the ensemble's own loops. There
+is no second generator, and each function has one rule.
 
 Kernels, which no model changes, are compiled by numba (`kernels.py`, `private_numba.py`) and call a structure's functions by
 their addresses (`numba_types.py`).

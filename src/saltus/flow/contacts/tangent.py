@@ -170,16 +170,19 @@ def impulse_columns(motion, acts, chosen):
     w = g w of the others, dg w is added.
     """
     own, local, count, signs = motion.own, motion.local, motion.contacts.shape[0], motion.signs
-    inverse, twist, right, moving = motion.inverse, np.zeros(local), motion.right, local - motion.first_order
+    inverse, twist, turned, right = motion.inverse, np.zeros(local), np.zeros(local), motion.right
+    moving = local - motion.first_order
     fill_slopes(motion)
     for j in range(motion.columns):
-        for a in range(local):  # M^-1 dM w
-            twist[a] = 0.0
+        for a in range(local):  # dM w, and then M^-1 dM w
+            turned[a] = 0.0
             for c in range(moving):
-                for b in range(moving):
-                    twist[a] += inverse[a, b] * slope(motion, j, local * b + c) * motion.jump[c]
-                if a >= moving:
-                    twist[a] += slope(motion, j, local * a + c) * motion.jump[c]
+                turned[a] += slope(motion, j, local * a + c) * motion.jump[c]
+            twist[a] = turned[a] if a >= moving else 0.0
+        for b in range(moving):
+            if turned[b] != 0.0:
+                for a in range(local):
+                    twist[a] += inverse[a, b] * turned[b]
         for i in range(count):
             right[i] = lift_rate(motion, j, i) - signs[i] * twist[motion.contacts[i, ContactColumn.COORDINATE]]
             for k in range(count):
