@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from scipy.optimize import fsolve
+from scipy.optimize import brentq, fsolve
 
 import saltus
 from saltus import Contact, ContactModel, NewtonImpact
@@ -47,6 +47,14 @@ def between(model, amplitude):
     return System(model=model, load=Load(frequency=0.7, force=Harmonic(amplitude)), impact=NewtonImpact(e=0.8))
 
 
+def test_an_orbit_has_the_multipliers_of_two_stops_of_one_coordinate():
+    """Two of them, and none of the dependent gap."""
+    plain, orbit = (saltus.find_orbit(between(model, 0.68), x=0.9, velocity=-0.2) for model in (Plain(), Stops()))
+    assert len(orbit.multipliers) == 2
+    np.testing.assert_allclose(orbit.multipliers, plain.multipliers[:2], rtol=0, atol=1e-11)
+
+
+@pytest.mark.thorough
 def test_orbits_branches_and_special_points_are_those_of_two_stops_of_one_coordinate():
     """Two multipliers, and none of the dependent gap."""
     found = []
@@ -127,6 +135,38 @@ def test_a_ball_that_hits_table_and_ceiling_once_a_period_follows_its_parabolas(
             ends.append(simulate(system, x=x, velocity=v, periods=1, tol=1e-14).final_state)
         slope[:, j] = (ends[0] - ends[1]) / (2.0 * step)
     np.testing.assert_allclose(np.sort(np.linalg.eigvals(slope)), np.sort(orbit.multipliers.real), rtol=0, atol=1e-8)
+
+
+def parabolas(amplitude, t, v):
+    """The next time at which a ball leaves the table, and its velocity then, with one impact at the ceiling in between."""
+    x = amplitude * math.sin(2.0 * t)
+    rise = (v - math.sqrt(v**2 - 0.6 * (2.5 - x))) / 0.3
+    back = -0.6 * (v - 0.3 * rise)
+    later = (
+        t
+        + rise
+        + brentq(lambda s: 2.5 + back * s - 0.15 * s**2 - amplitude * math.sin(2.0 * (t + rise + s)), 0.5, 3.0, xtol=1e-15)
+    )
+    w = 2.0 * amplitude * math.cos(2.0 * later)
+    return later, 1.6 * w - 0.6 * (back - 0.3 * (later - t - rise))
+
+
+def test_the_doubling_of_a_ball_between_table_and_ceiling_is_that_of_its_parabolas():
+    orbit = saltus.find_orbit(thrown(), x=1.5, velocity=1.0)
+    branch = saltus.continue_orbit(orbit, "load.ground.amplitude", bounds=(0.495, 0.53))
+    (doubling,) = [point for point in branch.special if str(point.kind) == "PD"]
+    hit = orbit.motion().events[0]
+    begin = hit.time % math.pi, float(hit.velocity_after[0])
+
+    def flips(amplitude):
+        fixed = fsolve(lambda y: np.subtract(parabolas(amplitude, *y), y) - (math.pi, 0.0), begin, xtol=1e-12)
+        columns = [
+            np.subtract(parabolas(amplitude, *(fixed + s)), parabolas(amplitude, *(fixed - s))) / 2e-6 for s in 1e-6 * np.eye(2)
+        ]
+        return np.linalg.det(np.array(columns).T + np.eye(2))
+
+    assert doubling.parameter == pytest.approx(brentq(flips, 0.5, 0.53, xtol=1e-12), abs=1e-7)
+    np.testing.assert_allclose(doubling.orbit.multipliers, [-1.0, -(0.6**4)], rtol=0, atol=1e-7)
 
 
 def test_exponents_of_a_ball_under_a_ceiling_are_those_of_its_orbit():
