@@ -39,7 +39,7 @@ def eigenmodes_of(structure: Any, spacing: int) -> np.ndarray:
 @lru_cache(maxsize=8)
 def _table(structure: Any, spacing: int) -> np.ndarray:
     contacts, surfaces = structure.contacts, structure.surfaces
-    # The eigenmodes of all sets are kept. A step takes as long as 3 of the other kind for 12 coordinates, 10 for 40.
+    # The eigenmodes of all sets are kept. A step takes as long as 3 of the other kind for 12 coordinates, 5 for 40, 15 for 100.
     if len(contacts) + len(surfaces) > 3 or longer_steps(structure) < 1.0 + len(structure.names) / 6.0:
         return np.zeros(0)
     blocks = [np.array([len(structure.channels), spacing, *(1.0 / np.arange(1, spacing + 1))])]
