@@ -3,7 +3,8 @@
 import math
 import pickle
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -304,3 +305,31 @@ def test_an_impact_pair_in_lanes_moves_like_each_by_itself():
         motion = saltus.simulate(system, z=0.1, x=0.2, velocity=(speed, 0.5), duration=15.0, tol=1e-13)
         assert int(many.impact_count[i]) == len(motion.impacts) > 0
         np.testing.assert_allclose([float(many.z[i]), float(many.x[i])], motion.position, rtol=0, atol=1e-9)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BallsInARoom(ContactModel):
+    """32 balls that fall, x_i'' = -1, below a ceiling at 9 and over a floor, with the floors of the last two balls last."""
+
+    coordinates: ClassVar[tuple[str, ...]] = tuple(f"x{i}" for i in range(32))
+    contacts: ClassVar[tuple[Contact, ...]] = (
+        *(Contact(name=f"ceiling{i}", coordinate=f"x{i}", position=9.0, sign=-1) for i in range(32)),
+        *(Contact(name=f"floor{i}", coordinate=f"x{i}") for i in range(32)),
+    )
+
+    def force(self, t, theta, velocity, load):
+        return (-1.0,) * 32
+
+
+@pytest.mark.thorough
+def test_the_last_of_64_contacts_closes_alone_and_with_the_one_before():
+    """A ball from h hits at the time sqrt(2 h), and again after e times twice that; its bit is the sign of an integer."""
+    system = System(model=BallsInARoom(), impact=NewtonImpact(e=0.5))
+    high = {f"x{i}": 8.0 for i in range(30)}
+    fall, lower = math.sqrt(2.0 * 0.7), math.sqrt(2.0 * 0.4)
+    together = saltus.simulate(system, **high, x30=0.7, x31=0.7, duration=2.2 * fall)
+    assert [event.contact for event in together.events.of(EventKind.IMPACT)] == ["floor30+floor31"] * 2
+    np.testing.assert_allclose(together.impacts.time, [fall, 2.0 * fall], rtol=0, atol=1e-13)
+    apart = saltus.simulate(system, **high, x30=0.7, x31=0.4, duration=1.7 * fall)
+    assert [event.contact for event in apart.events.of(EventKind.IMPACT)] == ["floor31", "floor30", "floor31"]
+    np.testing.assert_allclose(apart.impacts.time, [lower, fall, 2.0 * lower], rtol=0, atol=1e-13)

@@ -32,6 +32,13 @@ def eigenmodes_of(structure: Any, spacing: int) -> np.ndarray:
     set of closed contacts and of surfaces on whose side +1 it is, lambda, how far a mode reaches in units of the state, the rows
     of the inverse of the eigenvectors, the eigenvectors' coordinates, and the factors of the inputs; then the reactions of the
     contacts by eigenmodes and by inputs. The real and the imaginary part of a mode have rows of their own.
+
+    Parameters
+    ----------
+    structure
+        The structure.
+    spacing
+        The most coefficients that a series has.
     """
     return _table(structure, spacing)
 

@@ -186,7 +186,7 @@ def block_of(motion, hit, backwards):
     local, count = motion.local, motion.contacts.shape[0]
     joined, start, grows, block = np.zeros(local, np.bool_), 0, True, 0
     fill_contact_matrices(motion)
-    while hit >> start != 1 if backwards else not hit >> start & 1:
+    while not hit >> start & 1 or (backwards and start < count - 1 and hit >> start + 1):
         start += 1
     joined[motion.contacts[start, ContactColumn.COORDINATE]] = True
     if motion.columns > 0:

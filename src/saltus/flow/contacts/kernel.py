@@ -339,7 +339,7 @@ def contact_arc(motion, target):
         motion.contacts[i, ContactColumn.SKIP] = 0
     for k in range(motion.frictions.shape[0]):
         motion.frictions[k, FrictionColumn.SKIP] = 0
-    if bits > 0:
+    if bits != 0:  # the sign is the bit of the 64th contact
         motion.mode = Mode.CONTACT
         t = motion.time
         return contact_impact(motion, t, bits)
