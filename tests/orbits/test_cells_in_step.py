@@ -79,18 +79,19 @@ def test_multipliers_of_eight_cells_are_those_of_differences_of_motions() -> Non
     system = saltus.System(model=model, load=load, impact=saltus.NewtonImpact(e=0.0))
     places = {name: 0.4 if name.startswith("lower") else 0.0 for name in model.coordinates}
     orbit = saltus.find_orbit(system, **places, velocity=(0.0,) * 16)
-    start, moves, step = orbit.start(), [name for name in model.coordinates if name.startswith("lower")], 1e-6
-    lower, columns = np.arange(0, 16, 2), []
-    own = np.concatenate([lower, 16 + lower])
+    start, step, columns = orbit.start(), 1e-6, []
+    opened = np.flatnonzero(np.abs([start[name] for name in model.coordinates]) > 1e-3)  # all lower ones, or all upper ones
+    own = np.concatenate([opened, 16 + opened])
+    assert len(opened) == 8
     for place in range(16):
         ends = []
         for sign in (1.0, -1.0):
             given = dict(start)
             velocity = np.array(given.pop("velocity"))
             if place < 8:
-                given[moves[place]] += sign * step
+                given[model.coordinates[opened[place]]] += sign * step
             else:
-                velocity[lower[place - 8]] += sign * step
+                velocity[opened[place - 8]] += sign * step
             motion = saltus.simulate(system, **given, velocity=tuple(velocity), periods=1, tol=1e-14, dense=False)
             ends.append(np.ravel(motion.final_state)[own])
         columns.append((ends[0] - ends[1]) / (2 * step))
