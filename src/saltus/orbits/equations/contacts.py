@@ -233,17 +233,19 @@ class ContactsEquations(OrbitEquations):
         slope = np.zeros((2 * own, parameters + count))
         slope[free, np.arange(first)] = 1.0
         guards, rows = np.zeros(events), np.zeros((events, slope.shape[1]))
+        place = parameters + self.paths.index(FREQUENCY) if FREQUENCY in self.paths else None
+        moved, rates = np.empty(2 * own + 1), np.empty(2 * own + 1)
         for s in range(len(ends)):
-            start, stop = ends[s, SegmentEnd.NUMBERS :][2 * own : 4 * own], ends[s, SegmentEnd.NUMBERS :][6 * own : 8 * own]
             before = columns[s, :, : 2 * own] @ slope
             before[:, parameters:] += columns[s, :, 2 * own :]
-            moved = np.append(-columns[s, :-1, : 2 * own] @ start, ends[s, SegmentEnd.BY_START])
-            rates = np.append(stop, ends[s, SegmentEnd.BY_END])
-            for place, time, by in ((first + s, times[s], moved), (first + s + 1, times[s + 1], rates)):
-                if events:
-                    before[:, place] += by / frequency
-                if FREQUENCY in self.paths:
-                    before[:, parameters + self.paths.index(FREQUENCY)] -= by * time / frequency
+            numbers = ends[s, SegmentEnd.NUMBERS :]
+            moved[:-1], moved[-1] = -columns[s, :-1, : 2 * own] @ numbers[2 * own : 4 * own], ends[s, SegmentEnd.BY_START]
+            rates[:-1], rates[-1] = numbers[6 * own : 8 * own], ends[s, SegmentEnd.BY_END]
+            if events:
+                before[:, first + s] += moved / frequency
+                before[:, first + s + 1] += rates / frequency
+            if place is not None:
+                before[:, place] -= moved * times[s] / frequency + rates * times[s + 1] / frequency
             if not events:
                 slope = before[:-1]
                 break
